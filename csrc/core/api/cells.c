@@ -1,10 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../scene/points.h"
-#include "../cells/bins.h"
-#include "../base/status.h"
-#include "../base/os.h"
-#include "../search/walk.h"
+#include "../base/sort.h"
 
 #include <math.h>
 #include <string.h>
@@ -40,7 +36,10 @@ hs_cells_build(const hs_points *points, const hs_box *box, const hs_options *opt
     failure = hs_call_enter(&of_cells, failure, call);
     call->account.is_kept = true;
     hs_search_begin(call, &cells->search);
-    hs_status status = hs_check_arguments(points, NULL, hs_cells_box(cells), &of_cells, failure);
+    hs_status status = hs_check_sets(points, NULL, hs_cells_box(cells), failure);
+    if (status == HS_OK) {
+        status = hs_check_options(&of_cells, HS_WANT_ALL);
+    }
     for (int k = 0; status == HS_OK && options->domain != NULL && k < points->ndim; k++) {
         const double low = options->domain[k], high = options->domain[points->ndim + k];
         if (!(low > high) && !(low <= high && isfinite(low) && isfinite(high))) {
@@ -151,7 +150,7 @@ hs_cells_find(const hs_cells *cells, const hs_points *points, int64_t *cell, hs_
     }
     const hs_search *search = &cells->search;
     failure = hs_call_enter(&options, failure, &call);
-    hs_status status = hs_check_arguments(&cells->points, points, NULL, &options, failure);
+    hs_status status = hs_check_sets(&cells->points, points, NULL, failure);
     if (status == HS_OK) {
         status = hs_scene_from_kept(&call.account, NULL, &search->scene, points, &options, true,
                                     &scene, failure);
@@ -217,9 +216,8 @@ typedef struct range_list {
     const hs_search *search;
     hs_link         *links;
     int64_t         *hints;
-    const int64_t   *offsets; /* where the ranges of each query begin; NULL: they are counted */
-    int64_t         *counts;
-    int64_t         *first, *end;
+    int64_t         *next; /* of each query: where its next range goes, or their number so far */
+    int64_t         *first, *end;  /* NULL: ranges are counted */
     int64_t          si, unpolled; /* the query, in cell order; work since the last poll */
 } range_list;
 
@@ -251,10 +249,10 @@ add_window(range_list *list, int64_t query, hs_link *link, int64_t low, int64_t 
         int32_t first, end;
         hs_link_window(search, link, low - turn * n_x, high - turn * n_x, &first, &end);
         if (first < end) {
-            const int64_t at = list->counts[query]++;
-            if (list->offsets != NULL) {
-                list->first[list->offsets[query] + at] = first;
-                list->end[list->offsets[query] + at] = end;
+            const int64_t at = list->next[query]++;
+            if (list->first != NULL) {
+                list->first[at] = first;
+                list->end[at] = end;
             }
         }
         status = poll_sometimes(list, 1);
@@ -312,49 +310,6 @@ add_queries(range_list *list)
     return status;
 }
 
-/* With an open search: counts the ranges of each query, and then fills them. */
-static hs_status
-list_ranges(hs_search *search, hs_pairs *rows, hs_failure *failure)
-{
-    hs_account   *account = &search->call->account;
-    const int64_t n = hs_search_asking(search)->n, n_links = search->stencil.n_rows;
-    range_list    list = {.search = search};
-    int64_t      *offsets, n_ranges = 0;
-    hs_status     status = HS_ERR_MEMORY;
-    list.links = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.links);
-    list.hints = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.hints);
-    list.counts = hs_alloc(account, HS_FOR_INDICES, n, sizeof *list.counts);
-    if (list.links != NULL && list.hints != NULL && list.counts != NULL) {
-        memset(list.hints, 0, (size_t)n_links * sizeof *list.hints);
-        memset(list.counts, 0, (size_t)n * sizeof *list.counts);
-        status = hs_output_open_offsets(account, n + 1, &rows->offsets, &offsets);
-    }
-    if (status == HS_OK) {
-        status = add_queries(&list);
-    }
-    if (status == HS_OK) {
-        for (int64_t q = 0; q < n; q++) {
-            offsets[q] = n_ranges;
-            n_ranges += list.counts[q];
-            list.counts[q] = 0;
-        }
-        offsets[n] = n_ranges;
-        failure->search_bytes = (double)n_ranges * 2.0 * sizeof(int64_t);
-        status = hs_output_reserve(&rows->output, n_ranges, 0.0);
-    }
-    if (status == HS_OK) {
-        rows->output.n_pairs = n_ranges;
-        list.offsets = offsets;
-        list.first = hs_output_column(&rows->output, HS_WANT_I);
-        list.end = hs_output_column(&rows->output, HS_WANT_J);
-        status = add_queries(&list);
-    }
-    hs_free(account, list.counts);
-    hs_free(account, list.hints);
-    hs_free(account, list.links);
-    return status;
-}
-
 hs_status
 hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_options *options,
                     hs_pairs **result, hs_failure *failure)
@@ -366,6 +321,7 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
     }
     hs_search     search;
     hs_call      *call = &rows->call;
+    hs_account   *account = &call->account;
     const hs_sets sets = {.points = &cells->points,
                           .queries = queries,
                           .built = &cells->search,
@@ -373,14 +329,46 @@ hs_cells_candidates(const hs_cells *cells, const hs_points *queries, const hs_op
                           .is_untested = true,
                           /* no pairs; the ranges are allocated when their number is known */
                           .keeps_none = true};
-    status = hs_check_arguments(&cells->points, queries, NULL, &call->options, failure);
+    status = hs_check_sets(&cells->points, queries, NULL, failure);
+    if (status == HS_OK) {
+        status = hs_check_options(&call->options, HS_WANT_ALL);
+    }
     if (status == HS_OK) {
         call->options.precision = cells->call.options.precision; /* no pair is decided on */
         status = hs_search_reuse(&sets, call, &search, failure);
     }
     if (status == HS_OK) {
-        hs_output_init(&call->account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8, &rows->output);
-        status = list_ranges(&search, rows, failure);
+        const int64_t n = hs_search_asking(&search)->n, n_links = search.stencil.n_rows;
+        range_list    list = {.search = &search};
+        int64_t      *offsets;
+        hs_output_init(account, cells->points.ndim, HS_WANT_I | HS_WANT_J, 8, &rows->output);
+        list.links = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.links);
+        list.hints = hs_alloc(account, HS_FOR_STENCIL, n_links, sizeof *list.hints);
+        status = HS_ERR_MEMORY;
+        if (list.links != NULL && list.hints != NULL) {
+            memset(list.hints, 0, (size_t)n_links * sizeof *list.hints);
+            status = hs_output_open_offsets(account, n + 1, &rows->offsets, &offsets);
+        }
+        if (status == HS_OK) { /* counts the ranges of each query, and then fills them */
+            memset(offsets, 0, (size_t)(n + 1) * sizeof *offsets);
+            list.next = offsets + 1;
+            status = add_queries(&list);
+        }
+        if (status == HS_OK) {
+            hs_starts_of_lengths(offsets, n + 1);
+            failure->search_bytes = (double)offsets[n] * 2.0 * sizeof(int64_t);
+            status = hs_output_reserve(&rows->output, offsets[n], 0.0);
+        }
+        if (status == HS_OK) {
+            rows->output.n_pairs = offsets[n];
+            list.next = offsets;
+            list.first = hs_output_column(&rows->output, HS_WANT_I);
+            list.end = hs_output_column(&rows->output, HS_WANT_J);
+            status = add_queries(&list);
+            hs_starts_of_ends(offsets, n + 1);
+        }
+        hs_free(account, list.hints);
+        hs_free(account, list.links);
         hs_search_close(&search);
     } else if (status == HS_REBUILD) {
         /* The cutoff is not that of the cells, or a query is too far from their points. */

@@ -67,13 +67,7 @@ fill_rows(void *context, hs_query_run *run)
 static hs_status
 count_rows_of_step(void *context, hs_query_run *run)
 {
-    int64_t        *counts = (int64_t *)context + run->first_asking;
-    const int64_t   n = hs_search_asking(run->search)->n;
-    const hs_status status = hs_table_count(run->search, counts, run->failure);
-    for (int64_t i = 0; status == HS_OK && i < n; i++) {
-        run->n_pairs += counts[i];
-    }
-    return status;
+    return hs_table_count(run->search, (int64_t *)context + run->first_asking, run->failure);
 }
 
 /* Rows of several steps are made of their pairs in ascending order: where the rule is the same both
@@ -246,27 +240,29 @@ hs_neighbors_find(const hs_among *among, const hs_options *options, hs_pairs **r
 static hs_status
 count_rows(void *context, hs_query_run *run)
 {
-    int64_t  *counts = (int64_t *)context + run->first_asking;
-    hs_output found;
+    int64_t      *counts = (int64_t *)context + run->first_asking;
+    const int64_t n = hs_query_asking(run->query);
+    hs_status     status;
     if (is_single(run)) {
         run->plan.is_half = false;
-        return hs_query_each_step(run, count_rows_of_step, context);
-    }
-    const unsigned  columns = meets_itself(run) ? columns_of(run) : HS_WANT_I | HS_WANT_J;
-    const hs_status status = find_all(run, columns, &found);
-    if (status == HS_OK) {
+        status = hs_query_each_step(run, count_rows_of_step, context);
+    } else {
+        hs_output found;
+        status = find_all(run, meets_itself(run) ? columns_of(run) : HS_WANT_I | HS_WANT_J, &found);
         const int32_t *i = hs_output_column(&found, HS_WANT_I);
         const int32_t *j = hs_output_column(&found, HS_WANT_J);
-        memset(counts, 0, (size_t)hs_query_asking(run->query) * sizeof *counts);
-        for (int64_t e = 0; e < found.n_pairs; e++) {
+        memset(counts, 0, (size_t)n * sizeof *counts);
+        for (int64_t e = 0; status == HS_OK && e < found.n_pairs; e++) {
             counts[i[e]]++;
         }
-        for (int64_t e = 0; run->plan.is_half && e < found.n_pairs; e++) {
+        for (int64_t e = 0; status == HS_OK && run->plan.is_half && e < found.n_pairs; e++) {
             counts[j[e]]++;
         }
-        run->n_pairs += (run->plan.is_half ? 2 : 1) * found.n_pairs;
+        hs_output_free(&found);
     }
-    hs_output_free(&found);
+    for (int64_t row = 0; status == HS_OK && row < n; row++) {
+        run->n_pairs += counts[row];
+    }
     return status;
 }
 
@@ -402,14 +398,12 @@ plan_step(void *context, hs_query_run *run)
     planning       *now = context;
     hs_plan        *plan = &now->plan;
     const double    cutoff = run->call->options.cutoff;
-    const int64_t   n_before = plan->n_searches;
-    const double    expected_before = plan->expected_pairs;
     const hs_scene *scene = &run->search->scene;
     const hs_grid  *grid = &run->search->grid;
     const double    unscale = hs_scale_apply(scene->unscale, 1.0);
     double          expected;
     const hs_status status = hs_estimate_pairs(run->search, &expected);
-    if (n_before == 0 || cutoff > now->largest) {
+    if (plan->n_searches == 0 || cutoff > now->largest) {
         now->largest = cutoff;
         *plan = (hs_plan){.ndim = scene->ndim,
                           .n_periodic = scene->lattice.n_periodic,
@@ -424,7 +418,9 @@ plan_step(void *context, hs_query_run *run)
                           .n_cells = grid->n_cells,
                           .stencil_rows = run->search->stencil.n_rows,
                           .threads = hs_team_size(run->call->team),
-                          .kernel = run->call->kernel->name};
+                          .kernel = run->call->kernel->name,
+                          .n_searches = plan->n_searches,
+                          .expected_pairs = plan->expected_pairs};
         for (int k = 0; k < scene->ndim; k++) {
             plan->shape[k] = grid->shape[k];
             plan->cell_size[k] = grid->cell_size[k] * unscale;
@@ -434,8 +430,8 @@ plan_step(void *context, hs_query_run *run)
                                   : 0;
         }
     }
-    plan->n_searches = n_before + 1;
-    plan->expected_pairs = expected_before + expected;
+    plan->n_searches++;
+    plan->expected_pairs += expected;
     return status;
 }
 

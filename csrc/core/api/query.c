@@ -1,7 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../base/status.h"
-#include "../exact/ellipsoid.h"
 
 #include <limits.h>
 #include <math.h>
@@ -36,21 +34,6 @@ hs_check_box(const hs_box *box, int ndim)
                                                                                  : HS_ERR_ARGUMENT;
 }
 
-/* Each array that is wanted is there, if anything is to be written to it. */
-static bool
-can_hold(const hs_pair_arrays *out, unsigned want)
-{
-    const bool has_all = (!(want & HS_WANT_I) || out->i != NULL) &&
-                         (!(want & HS_WANT_J) || out->j != NULL) &&
-                         (!(want & HS_WANT_BOTH) || out->both != NULL) &&
-                         (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
-                         (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
-                         (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
-                         (!(want & HS_WANT_SHELL) || out->shell != NULL);
-    return (out->index_bytes == 4 || out->index_bytes == 8) && out->capacity >= 0 &&
-           (out->capacity == 0 || has_all);
-}
-
 hs_status
 hs_check_resources(const hs_options *options)
 {
@@ -63,8 +46,20 @@ hs_check_options(const hs_options *options, unsigned known)
     const unsigned want = options->want;
     const bool     is_known = (want & ~known) == 0;
     const bool     has_index = want == 0 || options->index_bytes == 4 || options->index_bytes == 8;
-    return is_known && has_index && hs_check_resources(options) == HS_OK &&
-                   (options->out == NULL || can_hold(options->out, want)) &&
+    bool           can_hold = true;
+    if (options->out != NULL) { /* each array is there, if anything is to be written to it */
+        const hs_pair_arrays *out = options->out;
+        const bool            has_all = (!(want & HS_WANT_I) || out->i != NULL) &&
+                             (!(want & HS_WANT_J) || out->j != NULL) &&
+                             (!(want & HS_WANT_BOTH) || out->both != NULL) &&
+                             (!(want & HS_WANT_DISTANCE) || out->distance != NULL) &&
+                             (!(want & HS_WANT_VECTOR) || out->vector != NULL) &&
+                             (!(want & HS_WANT_SHIFT) || out->shift != NULL) &&
+                             (!(want & HS_WANT_SHELL) || out->shell != NULL);
+        can_hold = (out->index_bytes == 4 || out->index_bytes == 8) && out->capacity >= 0 &&
+                   (out->capacity == 0 || has_all);
+    }
+    return can_hold && is_known && has_index && hs_check_resources(options) == HS_OK &&
                    options->cell_size >= 0.0 && (unsigned)options->algorithm < HS_ALGORITHM_END &&
                    (options->precision == HS_EXACT || options->precision == HS_DOUBLE ||
                     options->precision == HS_SINGLE)
@@ -95,9 +90,9 @@ check_shells(const hs_options *options, hs_failure *failure)
     return at[n - 1] == options->cutoff ? HS_OK : HS_ERR_ARGUMENT;
 }
 
-static hs_status
-check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
-           hs_failure *failure)
+hs_status
+hs_check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
+              hs_failure *failure)
 {
     hs_status status = hs_check_points(points, failure);
     if (status == HS_OK) {
@@ -109,14 +104,6 @@ check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
         status = status == HS_OK && queries->ndim != points->ndim ? HS_ERR_ARGUMENT : status;
     }
     return status;
-}
-
-hs_status
-hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
-                   const hs_options *options, hs_failure *failure)
-{
-    const hs_status status = check_sets(points, queries, box, failure);
-    return status == HS_OK ? hs_check_options(options, HS_WANT_ALL) : status;
 }
 
 /* Several searches take as long for each point as one that has so many pairs of it, at least. */
@@ -227,7 +214,7 @@ check_query(const hs_query *query, const hs_finder *finder, const hs_call *call,
     const hs_sets    *sets = &query->sets;
     const hs_options *options = &query->options;
     const bool        has_shells = query->reach == NULL && query->among == NULL;
-    hs_status         status = check_sets(sets->points, sets->queries, query->box, failure);
+    hs_status         status = hs_check_sets(sets->points, sets->queries, query->box, failure);
     if (status == HS_OK) {
         status = hs_check_options(options, HS_WANT_ALL | (has_shells ? HS_WANT_SHELL : 0));
     }

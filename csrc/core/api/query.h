@@ -2,13 +2,10 @@
 #ifndef HS_API_QUERY_H
 #define HS_API_QUERY_H
 
-#include "../../halfshell.h"
-#include "../base/base.h"
 #include "../collect/parallel.h"
 #include "../levels/levels.h"
 #include "../nearest/nearest.h"
 #include "../search/choice.h"
-#include "../search/search.h"
 
 /*
  * query.h: a query, checked once, and its way from there to what the caller gets. It is a plan of
@@ -39,9 +36,15 @@ hs_status hs_check_resources(const hs_options *options);
 /* `known`: the HS_WANT_ bits that there may be. */
 hs_status hs_check_options(const hs_options *options, unsigned known);
 
-/* Points, queries, box and options; failure->in_queries tells queries from points. */
-hs_status hs_check_arguments(const hs_points *points, const hs_points *queries, const hs_box *box,
-                             const hs_options *options, hs_failure *failure);
+HS_ALWAYS_INLINE bool
+hs_is_length(double x)
+{
+    return x >= 0.0 && isfinite(x);
+}
+
+/* Points, queries and box; failure->in_queries tells queries from points. */
+hs_status hs_check_sets(const hs_points *points, const hs_points *queries, const hs_box *box,
+                        hs_failure *failure);
 
 /* Cells that are kept between calls. */
 struct hs_cells {

@@ -1,15 +1,11 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../base/os.h"
-#include "../base/status.h"
-#include "../collect/components.h"
 
 #include <math.h>
 #include <string.h>
 
-/* stream.c: pairs that are never stored all at once: in blocks, shown to a function, or joined to
- * clusters. A stream holds a search of each system that is ready to be walked, a bookmark of how
- * far that has come, and the pairs that were found and not yet handed out. */
+/* stream.c: pairs in blocks. A stream holds a search of each system that is ready to be walked, a
+ * bookmark of how far that has come, and the pairs that were found and not yet handed out. */
 
 /* Pairs that are looked for at a time, at least: less would not pay for walkers and threads. */
 #define LEAST_FILL (INT64_C(1) << 16)
@@ -26,7 +22,7 @@ typedef struct source {
 
 struct hs_stream {
     hs_call     call;      /* that opened it; it has threads only while it looks for pairs */
-    source      own;       /* of a stream of one system */
+    source      own;       /* of a stream of one system; else only its query */
     source     *sources;   /* that one, or owned */
     int64_t     n_sources; /* the first ones, which have been opened */
     int64_t     at;        /* the present one */
@@ -218,30 +214,24 @@ open_source(source *one)
     return status;
 }
 
-/* Labels last until hs_stream_open returns. */
+/* Opens the one system of a query, or each of several. Labels last until hs_stream_open returns. */
 static hs_status
-open_alone(hs_stream *stream, const hs_query *query, const hs_finder *finder, hs_failure *failure)
+open_sources(hs_stream *stream, const hs_query *query, hs_failure *failure)
 {
-    source *one = stream->sources = &stream->own;
-    one->system.query = *query;
-    hs_status status = hs_query_open(&one->system.query, finder, &stream->call, &one->run, failure);
-    stream->n_sources = 1;
+    static const hs_finder of_pairs = {.is_numbered = true};
+    hs_call               *call = &stream->call;
+    source                *own = &stream->own;
+    own->system.query = *query;
+    hs_status status = hs_query_open(&own->system.query, &of_pairs, call, &own->run, failure);
     if (status == HS_OK) {
-        status = hs_choice_keep_labels(&query->sets, &stream->call);
+        status = hs_choice_keep_labels(&query->sets, call);
     }
-    return status == HS_OK ? open_source(one) : status;
-}
-
-static hs_status
-open_systems(hs_stream *stream, const hs_query *all, const hs_finder *finder, hs_failure *failure)
-{
-    const int64_t n = all->among->points != NULL ? all->among->points->n_systems : 0;
-    hs_call      *call = &stream->call;
-    hs_query_run  of_all;
-    hs_status     status = hs_query_open(all, finder, call, &of_all, failure);
-    if (status == HS_OK) {
-        status = hs_choice_keep_labels(&all->sets, call);
+    if (query->among == NULL) {
+        stream->sources = own;
+        stream->n_sources = 1;
+        return status == HS_OK ? open_source(own) : status;
     }
+    const int64_t n = status == HS_OK ? query->among->points->n_systems : 0;
     stream->choice = call->choice;
     if (status == HS_OK) {
         stream->sources = hs_alloc(&call->account, HS_FOR_INDICES, n, sizeof(source));
@@ -250,12 +240,12 @@ open_systems(hs_stream *stream, const hs_query *all, const hs_finder *finder, hs
     for (int64_t s = 0; status == HS_OK && s < n; s++) {
         source *one = &stream->sources[stream->n_sources++];
         one->n_steps = 0;
-        hs_system_begin(all, finder, call, failure, &one->system, &one->run);
-        status = hs_system_open(all, s, stream->choice, &one->system, &one->run);
+        hs_system_begin(query, &of_pairs, call, failure, &one->system, &one->run);
+        status = hs_system_open(query, s, stream->choice, &one->system, &one->run);
         status = status == HS_OK ? open_source(one) : status;
         failure->system = status == HS_OK ? -1 : s;
     }
-    if (status == HS_OK && stream->n_sources > 0) {
+    if (status == HS_OK && n > 0) {
         take_up(stream, 0);
     }
     return status;
@@ -265,7 +255,6 @@ hs_status
 hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pairs,
                hs_stream **result, hs_failure *failure)
 {
-    static const hs_finder of_pairs = {.is_numbered = true};
     if (result != NULL) {
         *result = NULL;
     }
@@ -286,8 +275,7 @@ hs_stream_open(const hs_among *among, const hs_options *options, int64_t max_pai
     failure = hs_call_enter(&query.options, failure, call);
     stream->max_pairs = max_pairs;
     stream->enough = max_pairs > LEAST_FILL ? max_pairs : LEAST_FILL;
-    const hs_status status = query.among != NULL ? open_systems(stream, &query, &of_pairs, failure)
-                                                 : open_alone(stream, &query, &of_pairs, failure);
+    const hs_status status = open_sources(stream, &query, failure);
     hs_call_tell_limit(call, status, failure);
     hs_call_leave(call, 0);
     hs_call_detach(call);
@@ -321,256 +309,4 @@ hs_stream_free(hs_stream *stream)
     }
     hs_account_close(&call->account);
     hs_free(NULL, stream);
-}
-
-/* Pairs handed to a function as they are found, stored nowhere. */
-
-/* Work of a call in candidates, for polling: functions take tens of nanoseconds and more. */
-#define CALL_WORK 32
-
-/* What the threads share. */
-typedef struct visiting {
-    const hs_visit *visit;
-    unsigned        want; /* columns, with indices of so many bytes */
-    int             index_bytes;
-    hs_query_run   *run; /* of the step; counts the pairs of threads that have ended */
-} visiting;
-
-/* What one thread works with. */
-typedef struct visitor {
-    const hs_visit *visit;    /* borrowed */
-    hs_output       part;     /* owned; the pairs that are being visited */
-    hs_recorder     recorder; /* owned; of the part */
-    int64_t         n_visited;
-} visitor;
-
-/* A hs_visit_fn. */
-static hs_status
-visit_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
-{
-    visitor        *doing = context;
-    const hs_visit *visit = doing->visit;
-    hs_output      *part = &doing->part;
-    part->n_pairs = 0;
-    const hs_status status = hs_record_hits(&doing->recorder, scanner, first, hits);
-    if (status != HS_OK) {
-        return status;
-    }
-    const hs_pair_arrays pairs = {.capacity = part->n_pairs,
-                                  .index_bytes = part->index_bytes,
-                                  .i = hs_output_column(part, HS_WANT_I),
-                                  .j = hs_output_column(part, HS_WANT_J),
-                                  .distance = hs_output_column(part, HS_WANT_DISTANCE),
-                                  .vector = hs_output_column(part, HS_WANT_VECTOR),
-                                  .shift = hs_output_column(part, HS_WANT_SHIFT)};
-    const int64_t       *i = pairs.i, *j = pairs.j;
-    int64_t              n_taken = part->n_pairs;
-    int                  stops = 0;
-    if (visit->pairs != NULL) {
-        stops = visit->pairs(&pairs, part->n_pairs, &n_taken, visit->user);
-    }
-    for (int64_t e = 0; visit->pairs == NULL && stops == 0 && e < part->n_pairs; e++) {
-        const double d = pairs.distance[e];
-        stops = visit->pair(i[e], j[e], pairs.shift + e * part->ndim, pairs.vector + e * part->ndim,
-                            d * d, visit->user);
-        n_taken = e + 1;
-    }
-    (void)hs_fpenv_enter(); /* the caller's function may have changed it */
-    doing->n_visited += n_taken;
-    scanner->work_since_poll += CALL_WORK * part->n_pairs;
-    return stops != 0 ? HS_ENOUGH : HS_OK;
-}
-
-static hs_status
-open_visitor(void *context, void *state, const hs_walker *walker)
-{
-    const visiting *shared = context;
-    visitor        *doing = state;
-    doing->visit = shared->visit;
-    hs_output_init(NULL, walker->search->scene.ndim, shared->want, shared->index_bytes,
-                   &doing->part);
-    return hs_recorder_init(&shared->run->call->account, &doing->part,
-                            walker->scanner.block.most_hits, &doing->recorder);
-}
-
-static void
-close_visitor(void *context, void *state)
-{
-    visiting *shared = context;
-    visitor  *doing = state;
-    shared->run->n_pairs += doing->n_visited;
-    hs_recorder_free(&shared->run->call->account, &doing->recorder);
-    hs_output_free(&doing->part);
-}
-
-/* A hs_use_fn: each thread visits the pairs that it finds. HS_ENOUGH: a function wants no more. */
-static hs_status
-visit_step(void *context, hs_query_run *run)
-{
-    visiting         shared = *(const visiting *)context;
-    const hs_visitor all = {.use = hs_record_use(shared.want),
-                            .visit = visit_hits,
-                            .shared = &shared,
-                            .state_size = sizeof(visitor),
-                            .open = open_visitor,
-                            .close = close_visitor};
-    shared.run = run;
-    if (!shared.visit->thread_safe) { /* other threads only make the search ready */
-        hs_call_dismiss(run->call);
-    }
-    return hs_parallel_visit(run->search, &all, NULL, run->failure);
-}
-
-/* For a visit by the caller's thread alone: others only make the search ready. */
-static void
-spare_threads(hs_query *query)
-{
-    const double n = (double)(hs_query_asking(query) / HS_POINTS_MADE_READY);
-    if (query->options.threads > 1 && hs_call_threads(n, &query->options) == 1) {
-        query->options.threads = 1;
-    }
-}
-
-hs_status
-hs_pairs_visit(const hs_among *among, const hs_options *options, const hs_visit *visit,
-               int64_t *n_visited, hs_failure *failure)
-{
-    visiting    shared = {.visit = visit,
-                          .want = HS_WANT_I | HS_WANT_J | HS_WANT_DISTANCE | HS_WANT_VECTOR |
-                                  HS_WANT_SHIFT,
-                          .index_bytes = 8};
-    hs_finder   finder = {.step = visit_step, .context = &shared, .is_numbered = true};
-    hs_counters done;
-    hs_query    query = hs_query_among(among, HS_HALF_LIST, options);
-    query.is_incomplete |= n_visited == NULL || visit == NULL ||
-                           (visit->pair == NULL && visit->pairs == NULL);
-    hs_query_want_none(&query);
-    query.sets.keeps_none = true;
-    query.options.want = shared.want;
-    query.options.index_bytes = shared.index_bytes;
-    if (query.options.counters == NULL) {
-        query.options.counters = &done;
-    }
-    finder.one_thread = !query.is_incomplete && !visit->thread_safe;
-    if (finder.one_thread) {
-        spare_threads(&query);
-    }
-    const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
-    if (n_visited != NULL) {
-        *n_visited = query.options.counters->pairs;
-    }
-    return status == HS_ENOUGH ? HS_OK : status;
-}
-
-/* Clusters of points, joined pair by pair while these are found. */
-
-/* What the pairs are for: clusters of all systems, or of one. */
-typedef struct clustering {
-    hs_components  components; /* owned; of one */
-    const uint8_t *core;       /* borrowed, or NULL */
-    int64_t       *labels;     /* borrowed */
-    uint8_t       *winding;    /* borrowed, or NULL */
-    int64_t        n_found;
-} clustering;
-
-/* A hs_pairs_fn: core points that are a pair belong together. */
-static int
-join_pairs(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
-{
-    clustering    *doing = user;
-    const int32_t *i = pairs->i, *j = pairs->j;
-    const int      n_axes = doing->components.n_axes;
-    (void)n_taken;
-    for (int64_t e = 0; e < n; e++) {
-        if (doing->core == NULL || (doing->core[i[e]] != 0 && doing->core[j[e]] != 0)) {
-            hs_components_join(&doing->components, i[e], j[e],
-                               n_axes > 0 ? pairs->shift + e * n_axes : NULL);
-        }
-    }
-    return 0;
-}
-
-/* A hs_pairs_fn: any other point belongs to the first cluster that has a core point near it. */
-static int
-adopt_points(const hs_pair_arrays *pairs, int64_t n, int64_t *n_taken, void *user)
-{
-    const clustering *doing = user;
-    const uint8_t    *core = doing->core;
-    const int32_t    *i = pairs->i, *j = pairs->j;
-    (void)n_taken;
-    for (int64_t e = 0; e < n; e++) {
-        if ((core[i[e]] != 0) != (core[j[e]] != 0)) {
-            int64_t      *label = &doing->labels[core[i[e]] != 0 ? j[e] : i[e]];
-            const int64_t near = doing->labels[core[i[e]] != 0 ? i[e] : j[e]];
-            *label = *label < 0 || near < *label ? near : *label;
-        }
-    }
-    return 0;
-}
-
-/* A hs_use_fn; context: the clustering of all systems. */
-static hs_status
-find_clusters(void *context, hs_query_run *run)
-{
-    clustering      *all = context, doing = *all;
-    hs_account      *account = &run->call->account;
-    const hs_visit   join = {.pairs = join_pairs, .user = &doing};
-    const hs_visit   adopt = {.pairs = adopt_points, .user = &doing};
-    visiting         shared = {.visit = &join, .want = HS_WANT_I | HS_WANT_J, .index_bytes = 4};
-    const hs_points *points = run->query->sets.points;
-    const hs_box    *box = run->query->box;
-    int              n_axes = 0;
-    doing.core = all->core != NULL ? all->core + run->first_point : NULL;
-    doing.labels = all->labels + run->first_point;
-    doing.winding = all->winding != NULL ? all->winding + all->n_found : NULL;
-    for (int l = 0; doing.winding != NULL && box != NULL && l < box->ndim; l++) {
-        n_axes = box->periodic[l] ? points->ndim : n_axes;
-    }
-    shared.want |= n_axes > 0 ? HS_WANT_SHIFT : 0;
-    hs_status status = hs_components_open(account, points->n, n_axes, &doing.components);
-    if (status == HS_OK) {
-        status = hs_query_each_step(run, visit_step, &shared);
-    }
-    if (status == HS_OK) {
-        doing.n_found =
-            hs_components_label(&doing.components, doing.core, doing.labels, doing.winding);
-    }
-    hs_components_close(account, &doing.components);
-    if (status == HS_OK && doing.core != NULL && points->n > 0 &&
-        memchr(doing.core, 0, (size_t)points->n) != NULL) {
-        /* Some point is near enough to a cluster only. The counters leave this out. */
-        const hs_counters done = run->call->done;
-        const int64_t     n_pairs = run->n_pairs;
-        shared.visit = &adopt;
-        shared.want = HS_WANT_I | HS_WANT_J;
-        status = hs_query_each_step(run, visit_step, &shared);
-        run->call->done = done;
-        run->n_pairs = n_pairs;
-    }
-    for (int64_t i = 0; status == HS_OK && all->n_found > 0 && i < points->n; i++) {
-        doing.labels[i] += doing.labels[i] >= 0 ? all->n_found : 0;
-    }
-    all->n_found += status == HS_OK ? doing.n_found : 0;
-    return status;
-}
-
-hs_status
-hs_clusters_find(const hs_among *among, const hs_options *options, const uint8_t *core,
-                 int64_t *labels, uint8_t *winding, int64_t *n_clusters, hs_failure *failure)
-{
-    int64_t    none; /* where there are no points, there may be no labels */
-    clustering all = {.core = core, .labels = labels != NULL ? labels : &none, .winding = winding};
-    const hs_finder finder = {.find = find_clusters, .context = &all, .one_thread = true};
-    hs_query        query = hs_query_among(among, HS_HALF_LIST, options);
-    query.is_incomplete |= n_clusters == NULL || !hs_has_entries(labels, query.sets.points);
-    hs_query_want_none(&query);
-    query.sets.keeps_none = true;
-    query.options.want = HS_WANT_I | HS_WANT_J | (winding != NULL ? HS_WANT_SHIFT : 0);
-    query.options.index_bytes = 4;
-    spare_threads(&query);
-    const hs_status status = hs_query_answer(&query, &finder, NULL, failure);
-    if (status == HS_OK) {
-        *n_clusters = all.n_found;
-    }
-    return status;
 }

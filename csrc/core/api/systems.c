@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "query.h"
-#include "../base/os.h"
 #include "../base/sort.h"
 
 #include <math.h>
@@ -189,23 +188,13 @@ typedef struct systems_job {
 /* What one thread works with. */
 typedef struct worker {
     hs_committer committer;
-    systems_job *job;
     hs_call      call;
     hs_system    system; /* the present one */
     hs_keeper    keeper;
     hs_output   *target;           /* that of all, or the backlog */
     hs_output    entries, offsets; /* owned; of one system, which are numbered afterwards */
-    int64_t      work;             /* since the last poll */
     hs_query_run run;
 } worker;
-
-/* A hs_poll_fn. */
-static bool
-poll_for_all(void *context, double fraction)
-{
-    const worker *me = context;
-    return hs_poll(me->committer.options, fraction) == HS_OK;
-}
 
 /* How much of all is done when this system begins. */
 static double
@@ -214,27 +203,25 @@ done_before(const systems_job *job, int64_t s)
     return (double)job->asking->first[s] / job->n_asking;
 }
 
-/* Adds a number to n of one column, every `step`-th from `at` on, but for -1, which is none. */
+/* Adds a number to one column, every `step`-th from `at` on, but for -1, which is none. */
 static void
-add_to_column(hs_output *output, unsigned bit, int64_t at, int64_t n, int step, int64_t more)
+add_to_column(hs_output *output, unsigned bit, int64_t at, int step, int64_t more)
 {
-    if (output->index_bytes == 4) {
-        int32_t *numbers = hs_output_column(output, bit);
-        for (int64_t e = 0; numbers != NULL && e < n; e++) {
-            numbers[at + e * step] += numbers[at + e * step] >= 0 ? (int32_t)more : 0;
-        }
-    } else {
-        int64_t *numbers = hs_output_column(output, bit);
-        for (int64_t e = 0; numbers != NULL && e < n; e++) {
-            numbers[at + e * step] += numbers[at + e * step] >= 0 ? more : 0;
-        }
+    int32_t      *narrow = hs_output_column(output, bit);
+    int64_t      *wide = hs_output_column(output, bit);
+    const int64_t end = wide != NULL ? output->n_pairs * step : 0;
+    for (int64_t e = at; output->index_bytes == 4 && e < end; e += step) {
+        narrow[e] += narrow[e] >= 0 ? (int32_t)more : 0;
+    }
+    for (int64_t e = at; output->index_bytes == 8 && e < end; e += step) {
+        wide[e] += wide[e] >= 0 ? more : 0;
     }
 }
 
 static hs_status
 search_system(worker *me, int64_t s)
 {
-    const systems_job *job = me->job;
+    const systems_job *job = me->committer.job;
     const hs_finder   *finder = job->all->finder;
     hs_query_run      *run = &me->run;
     hs_call           *call = &me->call;
@@ -261,12 +248,12 @@ search_system(worker *me, int64_t s)
         const int64_t  n = me->entries.n_pairs, at = target->n_pairs;
         status = hs_output_reserve(target, n, job->is_direct ? done_before(job, s + 1) : 0.0);
         if (status == HS_OK) {
+            add_to_column(&me->entries, HS_WANT_I, 0, 1, run->first_asking);
+            add_to_column(&me->entries, HS_WANT_J, 0, 1, run->first_point);
+            add_to_column(&me->entries, HS_WANT_BOTH, 0, 2, run->first_asking);
+            add_to_column(&me->entries, HS_WANT_BOTH, 1, 2, run->first_point);
             hs_output_copy(target, at, &me->entries, 0, n);
             target->n_pairs = at + n;
-            add_to_column(target, HS_WANT_I, at, n, 1, run->first_asking);
-            add_to_column(target, HS_WANT_J, at, n, 1, run->first_point);
-            add_to_column(target, HS_WANT_BOTH, 2 * at, n, 2, run->first_asking);
-            add_to_column(target, HS_WANT_BOTH, 2 * at + 1, n, 2, run->first_point);
         } else {
             me->committer.failure.expected_pairs = (double)(at + n);
         }
@@ -285,12 +272,8 @@ search_system(worker *me, int64_t s)
         me->committer.failure.system = s;
         return status;
     }
-    me->work += SYSTEM_WORK + call->done.candidates - before;
-    if (me->work <= POLL_WORK) {
-        return HS_OK;
-    }
-    me->work = 0;
-    return hs_poll(me->committer.options, done_before(job, s + 1));
+    return hs_note_work(&me->committer, SYSTEM_WORK + call->done.candidates - before, POLL_WORK,
+                        done_before(job, s + 1));
 }
 
 /* A hs_range_fn. */
@@ -298,7 +281,7 @@ static hs_status
 search_range(void *context, int64_t range)
 {
     worker            *me = context;
-    const systems_job *job = me->job;
+    const systems_job *job = me->committer.job;
     hs_output         *output = job->all->output;
     const int64_t      first = range * job->in_range, left = job->asking->n_systems - first;
     const int64_t      end = first + (left < job->in_range ? left : job->in_range);
@@ -314,8 +297,7 @@ search_range(void *context, int64_t range)
         /* most batches have systems of similar size */
         hs_output_reserve_hint(output, (double)output->n_pairs / done);
     }
-    /* Of nothing, where pairs are written directly: then it only says how far this has come. */
-    return hs_commit(&me->committer, done, true);
+    return job->is_direct ? HS_OK : hs_commit(&me->committer, done, true);
 }
 
 /* Cannot fail: memory is taken as it is needed. */
@@ -327,13 +309,10 @@ open_worker(void *context, void *place)
     const hs_options   *options = &all->call->options;
     worker             *me = place;
     hs_query_run       *run = &me->run;
-    me->job = job;
     hs_call_begin(options, &me->call);
     me->call.options.threads = 1;
     me->call.options.out = NULL;
-    if (options->poll != NULL) { /* which counts already, for the whole call */
-        hs_call_set_poll(poll_for_all, me, &me->call);
-    }
+    me->committer.options = &me->call.options; /* whose poll asks that of the whole call */
     hs_system_begin(all->query, all->finder, &me->call, &me->committer.failure, &me->system, run);
     run->keeper = &me->keeper;
     hs_search_begin(&me->call, &run->step.search);

@@ -5,9 +5,6 @@
 #include "../../halfshell.h"
 #include "base.h"
 
-#include <stdbool.h>
-#include <stdint.h>
-
 /*
  * os.h: the floating-point environment of a call, and the polls that let its caller stop it.
  */
@@ -47,8 +44,6 @@ void hs_fpenv_flush(bool on);
 /* Whether this thread has met a subnormal number since it last entered or set flushing, on or off;
  * false where that is not known. */
 bool hs_fpenv_met_subnormal(void);
-
-/* Asking the caller whether to go on. */
 
 /* Points that loading, wrapping and sorting handle between two polls: some milliseconds. */
 #define HS_POLL_POINTS (INT64_C(1) << 17)

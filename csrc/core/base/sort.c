@@ -92,13 +92,6 @@ sort_by_digit(uint64_t *keys, int32_t *ids, int64_t n, int from, uint64_t *spare
         insert(keys, ids, n, from);
         return 0;
     }
-    int64_t ascending = 1;
-    while (ascending < n && keys[ascending - 1] >> from <= keys[ascending] >> from) {
-        ascending++;
-    }
-    if (ascending == n) { /* as rows of pairs that are given in order */
-        return 0;
-    }
     uint64_t lowest = keys[0] >> from, highest = lowest;
     for (int64_t e = 1; e < n; e++) {
         const uint64_t key = keys[e] >> from;

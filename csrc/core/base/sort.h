@@ -5,8 +5,6 @@
 #include "../../halfshell.h"
 #include "base.h"
 
-#include <string.h>
-
 /*
  * sort.h: sorting of numbers: by digits where there are many, by insertion in short rows; and the
  * starts of parts from their lengths.

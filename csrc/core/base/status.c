@@ -54,8 +54,6 @@ hs_status_text(hs_status status)
     return "unknown status";
 }
 
-/* A table with one entry for each quantity. */
-
 /* Bytes of one pair: a fixed number of entries, or one for each axis. */
 typedef struct quantity {
     hs_purpose purpose;

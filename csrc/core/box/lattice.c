@@ -3,7 +3,6 @@
 #include "../exact/arithmetic.h"
 
 #include <math.h>
-#include <string.h>
 
 /*
  * lattice.c: a short basis of the box vectors, and a unit normal for each grid axis.
@@ -425,9 +424,6 @@ full_rank(uint64_t p, int ndim, int n_rows, const double rows[][HS_MAX_DIM], int
 hs_scale
 hs_scale_of(int exponent)
 {
-    if (exponent == 0) { /* as it nearly always is */
-        return (hs_scale){0, 1.0, 1.0};
-    }
     const int half = exponent / 2;
     return (hs_scale){exponent, hs_power_of_two(-half), hs_power_of_two(half - exponent)};
 }
@@ -775,8 +771,6 @@ hs_lattice_shift(const hs_lattice *lattice, const int64_t *reduced, int64_t *giv
     }
     return true;
 }
-
-/* Tests of the reduced basis: how flat it is, and how large its coefficients are. */
 
 /* Least height of a reduced basis in its row, with much room: 8 rows may have 2^-4. */
 #define LEAST_HEIGHT 0x1p-20

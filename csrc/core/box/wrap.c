@@ -2,9 +2,6 @@
 #include "wrap.h"
 #include "../exact/arithmetic.h"
 
-#include <math.h>
-#include <string.h>
-
 /* wrap.c: one point in any box, and columns of points along coordinate axes. Remainders are exact
  * or computed by compensated sums. */
 
@@ -285,6 +282,8 @@ hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, in
 
 /* Adding and subtracting this rounds any |x| < 2^51 to an integer, ties to even, as rint() does. */
 #define ROUNDER 0x1.8p52
+/* Turns over a given box vector up to which the products are exact, with much room. */
+#define FEW_TURNS 0x1p20
 
 /* Work arrays of one tile. */
 typedef struct tile {
@@ -393,8 +392,8 @@ find_ranges(const hs_lattice *lattice, tile *work, hs_wrap_range *folded)
 }
 
 void
-hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
-               int64_t last, double *const *x, const hs_turns *turns, hs_wrap_range *folded)
+hs_fold_points(const hs_lattice *lattice, double *const *r, int64_t first, int64_t last,
+               double *const *x, const hs_turns *turns, hs_wrap_range *folded)
 {
     tile   work;
     double largest = 1.0; /* of U: one turn over B makes at most so many over a given vector */
@@ -403,7 +402,7 @@ hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int6
             largest = fmax(largest, fabs((double)lattice->U[row][l]));
         }
     }
-    const double most = few_turns ? INFINITY : HS_FOLD_TURNS / largest;
+    const double most = FEW_TURNS / largest;
     for (int64_t begin = first; begin < last; begin += TILE) {
         const double *from[HS_MAX_DIM];
         hs_wrap_range found = *folded;

@@ -94,11 +94,10 @@ void hs_fold_axis(const hs_lattice *lattice, int k, double *x, int64_t first, in
 
 /*
  * In any lattice: points [first, last) of the columns r go wrapped to the columns x, which may be
- * r. few_turns: hs_fold_turns() says that no point is more than HS_FOLD_TURNS away; if false, each
- * point is tested.
+ * r.
  */
-void hs_fold_points(const hs_lattice *lattice, bool few_turns, double *const *r, int64_t first,
-                    int64_t last, double *const *x, const hs_turns *turns, hs_wrap_range *folded);
+void hs_fold_points(const hs_lattice *lattice, double *const *r, int64_t first, int64_t last,
+                    double *const *x, const hs_turns *turns, hs_wrap_range *folded);
 
 /* t_k of n points, with the bits of hs_lattice_coordinate: summed in its order. */
 void hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *x, int64_t n,
@@ -107,8 +106,6 @@ void hs_fold_coordinates(const hs_lattice *lattice, int k, const double *const *
 /* At least the turns over any row of B that a point with all |x| <= largest needs, and the turns
  * over the given box vectors that these make. */
 double hs_fold_turns(const hs_lattice *lattice, double largest);
-
-#define HS_FOLD_TURNS 0x1p20
 
 /*
  * The nearest image of one point to another, decided exactly, in any box. Floats with a bound on

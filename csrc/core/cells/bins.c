@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "bins.h"
-#include "../../kernels/kernel.h"
 #include "../base/sort.h"
-
-#include <math.h>
 
 /*
  * bins.c: a stable counting sort, O(n + cells).
@@ -274,48 +271,6 @@ hs_bins_take(hs_scene *scene, hs_bins *bins)
     scene->beside = NULL;
 }
 
-hs_status
-hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-              const hs_grid *grid, bool of_queries, hs_bins *bins)
-{
-    const int64_t n = scene->n;
-    hs_status     status = HS_OK;
-    hs_bins_take(scene, bins);
-    if (of_queries) {
-        bins->cells = hs_alloc(account, HS_FOR_CELLS, n, sizeof *bins->cells);
-    } else {
-        bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof *bins->start);
-    }
-    if (bins->start == NULL && bins->cells == NULL) {
-        status = HS_ERR_MEMORY;
-    } else if (grid->n_cells == 1) {
-        bins->squares = (double)n * (double)n;
-        for (int64_t i = 0; i < n; i++) {
-            bins->order[i] = (int32_t)i;
-        }
-        if (of_queries) {
-            memset(bins->cells, 0, (size_t)n * sizeof *bins->cells);
-        } else {
-            bins->start[0] = 0;
-            bins->start[1] = (int32_t)n;
-        }
-    } else {
-        const bool is_few = n <= FEW_QUERIES && n <= grid->n_cells / CELLS_PER_FEW;
-        void      *spare = scene->cloud.spare;
-        sorting    sort = {.grid = grid, .lattice = &scene->lattice, .bins = bins, .x = bins->x};
-        sort.cells = of_queries && is_few ? bins->cells : spare;
-        status = of_queries && is_few ? sort_few(account, &sort, spare, bins)
-                                      : sort_many(account, team, options, &sort, bins);
-        if (status == HS_OK) {
-            status = hs_bins_arrange(account, team, options, scene, bins);
-        }
-    }
-    if (status != HS_OK) {
-        hs_bins_free(account, bins);
-    }
-    return status;
-}
-
 void
 hs_bins_free(hs_account *account, hs_bins *bins)
 {
@@ -502,9 +457,6 @@ hs_sparse_choose(const hs_scene *scene, const hs_grid *dense, bool always)
     return 0.5 * crowd > least ? best : 0.0;
 }
 
-/* Sorts the points into rows of cells; finds rows, windows and groups by steps that double, then by
- * halves. */
-
 /* Does the row come before these indices? */
 HS_ALWAYS_INLINE bool
 row_is_before(const hs_bins *bins, int64_t row, const int64_t *index)
@@ -648,14 +600,15 @@ sort_by_axis(build *b, int64_t first, int64_t end, int k)
     return status;
 }
 
-hs_status
-hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-                hs_grid *grid, hs_bins *bins)
+/* Sorts the point numbers of a sparse grid into bins->order, and fills all that tells its rows and
+ * cells. */
+static hs_status
+sort_sparse(hs_account *account, const hs_options *options, const hs_scene *scene, hs_grid *grid,
+            hs_bins *bins)
 {
     const int64_t n = scene->n;
     build         b = {.scene = scene, .grid = grid};
     hs_status     status = HS_ERR_MEMORY;
-    hs_bins_take(scene, bins);
     grid->n_cells = 0;
     bins->cell_x = hs_alloc(account, HS_FOR_CELLS, n, sizeof(int64_t));
     int32_t *spare_ids = hs_alloc(account, HS_FOR_ORDER, n, sizeof *spare_ids);
@@ -707,10 +660,48 @@ hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options, h
             const double here = bins->start[c + 1] - bins->start[c];
             bins->squares += here * here;
         }
-        status = hs_bins_arrange(account, team, options, scene, bins);
-    }
-    if (status != HS_OK) {
-        hs_bins_free(account, bins);
     }
     return status;
+}
+
+hs_status
+hs_bins_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
+              hs_grid *grid, bool of_queries, hs_bins *bins)
+{
+    const int64_t n = scene->n;
+    const bool    is_sparse = grid->stride[0] == 0;
+    hs_status     status = HS_OK;
+    hs_bins_take(scene, bins);
+    if (is_sparse) {
+        status = sort_sparse(account, options, scene, grid, bins);
+    } else if (of_queries) {
+        bins->cells = hs_alloc(account, HS_FOR_CELLS, n, sizeof *bins->cells);
+    } else {
+        bins->start = hs_alloc(account, HS_FOR_CELLS, grid->n_cells + 1, sizeof *bins->start);
+    }
+    if (bins->start == NULL && bins->cells == NULL) {
+        return status == HS_OK ? HS_ERR_MEMORY : status;
+    }
+    if (!is_sparse && grid->n_cells == 1) {
+        bins->squares = (double)n * (double)n;
+        for (int64_t i = 0; i < n; i++) {
+            bins->order[i] = (int32_t)i;
+        }
+        if (of_queries) {
+            memset(bins->cells, 0, (size_t)n * sizeof *bins->cells);
+        } else {
+            bins->start[0] = 0;
+            bins->start[1] = (int32_t)n;
+        }
+        return HS_OK;
+    }
+    if (!is_sparse) {
+        const bool is_few = n <= FEW_QUERIES && n <= grid->n_cells / CELLS_PER_FEW;
+        void      *spare = scene->cloud.spare;
+        sorting    sort = {.grid = grid, .lattice = &scene->lattice, .bins = bins, .x = bins->x};
+        sort.cells = of_queries && is_few ? bins->cells : spare;
+        status = of_queries && is_few ? sort_few(account, &sort, spare, bins)
+                                      : sort_many(account, team, options, &sort, bins);
+    }
+    return status == HS_OK ? hs_bins_arrange(account, team, options, scene, bins) : status;
 }

@@ -5,8 +5,6 @@
 #include "../threads/call.h"
 #include "grid.h"
 
-#include <string.h>
-
 /*
  * bins.h: the points in cell order. Point number si here is order[si] in the caller's array; cell c
  * holds si in [start[c], start[c + 1]), in ascending order of the caller's numbers.
@@ -34,13 +32,14 @@ typedef struct hs_bins {
 } hs_bins;
 
 /*
- * Sorts, polling now and then; takes the scene's arrays over or frees them. On failure holds
- * nothing. The result does not depend on the team. of_queries: what is stored is the cell of each
+ * Sorts, polling now and then; takes the scene's arrays over. To be freed on failure as well. The
+ * result does not depend on the team. of_queries: what is stored is the cell of each
  * point, not where the points of each cell begin; and few points take time for themselves alone,
- * however many cells there are.
+ * however many cells there are. In a sparse grid points are sorted by row, cell and the caller's
+ * number, also of queries, and grid->n_cells becomes the number of occupied cells.
  */
 hs_status hs_bins_build(hs_account *account, hs_team *team, const hs_options *options,
-                        hs_scene *scene, const hs_grid *grid, bool of_queries, hs_bins *bins);
+                        hs_scene *scene, hs_grid *grid, bool of_queries, hs_bins *bins);
 
 /* Steps of hs_bins_build, for other orders: the scene's arrays become those of the bins, in the
  * caller's order as yet, and without `start`; the scene's spare column stays usable. */
@@ -72,7 +71,7 @@ void hs_bins_free(hs_account *account, hs_bins *bins);
 /*
  * The grid of a scene with rows of cells `width` ranges wide (a power of two from 1 on) and cells
  * of width / HS_SPARSE_SPLIT along the first axis, however many these are; range, shift_error and
- * expected_pairs are those of `dense`. stride is 0, and n_cells is 0 until hs_sparse_build has
+ * expected_pairs are those of `dense`. stride is 0, and n_cells is 0 until hs_bins_build has
  * counted the occupied cells.
  */
 void hs_sparse_grid(const hs_scene *scene, const hs_grid *dense, double width, hs_grid *grid);
@@ -117,7 +116,7 @@ double hs_sparse_choose(const hs_scene *scene, const hs_grid *dense, bool always
  * hashed: targets of neighbouring rows come in nearly ascending order, so that a hint finds them in
  * O(1), and no input makes a search slower than O(log n).
  *
- * hs_sparse_grid, hs_stencil_build and hs_sparse_build come first; walk.h walks. Each pair is met
+ * hs_sparse_grid, hs_stencil_build and hs_bins_build come first; walk.h walks. Each pair is met
  * once: a group may see cells that are too far from some of its points, but always along the row
  * offset by which they see each other, and only forward (grid.h).
  */
@@ -133,14 +132,6 @@ typedef struct hs_sparse_group {
     int64_t x_first, x_last; /* indices of the cells that the first and the last are in */
     int32_t cell;            /* where the last one is */
 } hs_sparse_group;
-
-/*
- * Sorts the points by row, cell and the caller's number, polling now and then; takes the scene's
- * arrays over or frees them, as hs_bins_build does. grid->n_cells becomes the number of occupied
- * cells. On failure holds nothing. grid: from hs_sparse_grid.
- */
-hs_status hs_sparse_build(hs_account *account, hs_team *team, const hs_options *options,
-                          hs_scene *scene, hs_grid *grid, hs_bins *bins);
 
 /* The row with these indices (index[0] is not read), or -1. *hint: a row to start from, any in
  * 0 ... n_rows; receives where the row is or would be. */

@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "grid.h"
 #include "../exact/arithmetic.h"
-#include "../base/os.h"
 #include "../base/status.h"
-
-#include <math.h>
-#include <string.h>
 
 /*
  * grid.c: how far apart the coordinates of a pair can be, then one cell or several, whichever makes
@@ -315,10 +311,8 @@ hs_grid_init(const hs_scene *scene, hs_grid_kind kind, hs_grid *grid, hs_failure
                 parts = fmin(fmax(nearbyint(points / POINTS_PER_CELL), 1.0), 4.0);
             }
             const double pitch = grid->range[k] * PART_SLACK / parts;
-            counts[k] = 1.0;
-            if (extent > pitch) { /* never for a zero extent, also with cutoff 0 */
-                counts[k] = floor(fmin(extent / pitch, CELLS_PER_AXIS));
-            }
+            /* Not for a zero extent, also with cutoff 0. */
+            counts[k] = extent > pitch ? floor(fmin(extent / pitch, CELLS_PER_AXIS)) : 1.0;
             area *= fmax(extent, grid->range[k]) / counts[k]; /* flat scenes count as this thick */
         }
         const bool capped = cap_counts(scene->ndim, grid_most_cells(scene), counts);
@@ -527,7 +521,6 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
     /* Counting up from the own row visits exactly the forward half. */
     for (int64_t tried = 1;; tried++) {
         if (tried % POLL_ROWS == 0 && hs_poll(options, 0.0) != HS_OK) {
-            hs_stencil_free(account, stencil);
             return HS_ERR_INTERRUPTED;
         }
         if (stencil->n_rows == capacity) {
@@ -536,7 +529,6 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
             hs_stencil_row *grown = hs_grow(account, HS_FOR_STENCIL, stencil->rows, capacity, more,
                                             sizeof(hs_stencil_row));
             if (grown == NULL) {
-                hs_stencil_free(account, stencil);
                 return HS_ERR_MEMORY;
             }
             stencil->rows = grown;
@@ -560,13 +552,6 @@ hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene 
         }
         row.offset[k]++;
     }
-}
-
-void
-hs_stencil_free(hs_account *account, hs_stencil *stencil)
-{
-    hs_free(account, stencil->rows);
-    stencil->rows = NULL;
 }
 
 /* Cells of a width that the caller chooses. Any cells find all pairs, for their reach follows from

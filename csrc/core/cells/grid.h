@@ -85,15 +85,14 @@ typedef struct hs_stencil {
     int64_t         n_rows;
 } hs_stencil;
 
-/* Polls now and then. HS_ERR_MEMORY or HS_ERR_BOX_SKEWED when the rows do not fit. is_full: the
- * backward half as well, for points that meet all their neighbours. */
+/* Polls now and then. HS_ERR_MEMORY or HS_ERR_BOX_SKEWED when the rows do not fit; the rows are to
+ * be freed then as well. is_full: the backward half as well, for points that meet all their
+ * neighbours. */
 hs_status hs_stencil_build(hs_account *account, const hs_options *options, const hs_scene *scene,
                            const hs_grid *grid, bool is_full, hs_stencil *stencil);
 
 /* Bytes that the rows take at least, in boxes along the coordinate axes; elsewhere about so
  * many. */
 double hs_stencil_bytes(const hs_grid *grid, bool is_full);
-
-void hs_stencil_free(hs_account *account, hs_stencil *stencil);
 
 #endif

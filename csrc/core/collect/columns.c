@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "columns.h"
-#include "../base/os.h"
 
 #include <math.h>
 #include <string.h>
@@ -200,20 +199,50 @@ fitting(const hs_output *output, int64_t at, int64_t n)
     return output->fixed && n > output->capacity - at ? output->capacity - at : n;
 }
 
-void
-hs_output_touch(hs_output *output, int64_t at, int64_t n)
+/* Writes to each page of so many bytes that begins in the room of pairs [at, at + n). */
+static void
+touch_pages(const hs_output *output, int64_t at, int64_t n, size_t page)
 {
-    n = fitting(output, at, n);
     for (int k = 0; n > 0 && k < HS_QUANTITIES; k++) {
         if (output->columns >> k & 1u) {
             const size_t width = hs_output_width(output, 1u << k), n_bytes = (size_t)n * width;
             char        *from = output->column[k].data + (size_t)at * width;
-            size_t       page = (size_t)(-(uintptr_t)from & (HS_PAGES_FROM - 1));
-            for (; page < n_bytes; page += HS_PAGES_FROM) {
-                *(volatile char *)(from + page) = 0;
+            for (size_t b = (size_t)(-(uintptr_t)from & (page - 1)); b < n_bytes; b += page) {
+                *(volatile char *)(from + b) = 0; /* never read, but must be written */
             }
         }
     }
+}
+
+void
+hs_output_touch(hs_output *output, int64_t at, int64_t n)
+{
+    touch_pages(output, at, fitting(output, at, n), HS_PAGES_FROM);
+}
+
+/* Bytes of the smallest pages there are. Larger ones are written to several times, which costs
+ * little. */
+#define PAGE 4096
+/* Fewer bytes are cleared in a tenth of a second. */
+#define LEAST_TOUCHED (INT64_C(1) << 26)
+
+/* A hs_slab_fn. */
+static hs_status
+touch_strip(void *output, int strip, int64_t first, int64_t last)
+{
+    (void)strip;
+    touch_pages(output, first, last - first, PAGE);
+    return HS_OK;
+}
+
+hs_status
+hs_touch_output(hs_team *team, const hs_options *options, hs_output *output)
+{
+    const int64_t n = output->n_pairs;
+    const int     n_strips = hs_strips_for(team, n, 1, 0); /* far apart: no two share a page */
+    return n * hs_output_bytes_per_pair(output) < LEAST_TOUCHED
+               ? HS_OK
+               : hs_walk_points(team, options, n, n_strips, touch_strip, output);
 }
 
 void
@@ -241,48 +270,41 @@ hs_output_copy(hs_output *output, int64_t at, const hs_output *part, int64_t fir
 
 #define ROWS_AHEAD 16 /* rows from prefetching a place to writing there */
 
-static void
-place_column(char *column, const char *from, size_t width, bool bypass, const int64_t *offsets,
-             const int32_t *row, int64_t n, int64_t known)
-{
-    for (int64_t t = 0; t < n; t++) {
-        const int64_t *place = offsets + row[t];
-        const size_t   n_bytes = (size_t)(place[1] - place[0]) * width;
-        char          *to = column + (size_t)place[0] * width;
-        if (t + 2 * ROWS_AHEAD < known) {
-            HS_PREFETCH(offsets + row[t + 2 * ROWS_AHEAD]);
-        }
-        if (t + ROWS_AHEAD < known) {
-            const int64_t *next = offsets + row[t + ROWS_AHEAD];
-            const char    *line = column + (size_t)next[0] * width;
-            const char    *end = column + (size_t)next[1] * width;
-            /* The lines of a row that it shares with others, or all of them; the others are written
-             * whole past the caches. */
-            for (; line < end && !bypass; line += HS_ALIGNMENT) {
-                HS_PREFETCH_WRITE(line);
-            }
-            HS_PREFETCH_WRITE(line);
-            HS_PREFETCH_WRITE(end);
-        }
-        if (bypass) {
-            hs_bypass_copy(to, from, n_bytes);
-        } else {
-            memcpy(to, from, n_bytes);
-        }
-        from += n_bytes;
-    }
-}
-
 void
 hs_output_place(const hs_output *output, const int64_t *offsets, const hs_output *part,
                 const int32_t *row, int64_t n, int64_t known)
 {
     for (int k = 0; k < HS_QUANTITIES && part->n_pairs > 0; k++) {
-        if (output->columns >> k & 1u) {
-            const size_t width = hs_output_width(output, 1u << k);
-            place_column(output->column[k].data, part->column[k].data, width,
-                         (double)output->capacity * (double)width >= LEAST_BYPASSED, offsets, row,
-                         n, known);
+        const int64_t n_rows = output->columns >> k & 1u ? n : 0;
+        const size_t  width = hs_output_width(output, 1u << k);
+        const bool    bypass = (double)output->capacity * (double)width >= LEAST_BYPASSED;
+        char         *column = output->column[k].data;
+        const char   *from = part->column[k].data;
+        for (int64_t t = 0; t < n_rows; t++) {
+            const int64_t *place = offsets + row[t];
+            const size_t   n_bytes = (size_t)(place[1] - place[0]) * width;
+            char          *to = column + (size_t)place[0] * width;
+            if (t + 2 * ROWS_AHEAD < known) {
+                HS_PREFETCH(offsets + row[t + 2 * ROWS_AHEAD]);
+            }
+            if (t + ROWS_AHEAD < known) {
+                const int64_t *next = offsets + row[t + ROWS_AHEAD];
+                const char    *line = column + (size_t)next[0] * width;
+                const char    *end = column + (size_t)next[1] * width;
+                /* The lines of a row that it shares with others, or all of them; the others are
+                 * written whole past the caches. */
+                for (; line < end && !bypass; line += HS_ALIGNMENT) {
+                    HS_PREFETCH_WRITE(line);
+                }
+                HS_PREFETCH_WRITE(line);
+                HS_PREFETCH_WRITE(end);
+            }
+            if (bypass) {
+                hs_bypass_copy(to, from, n_bytes);
+            } else {
+                memcpy(to, from, n_bytes);
+            }
+            from += n_bytes;
         }
     }
     hs_bypass_end();
@@ -328,77 +350,6 @@ hs_output_free(hs_output *output)
     output->charged = 0;
 }
 
-/* Bytes of the smallest pages there are. Larger ones are written to several times, which costs
- * little. */
-#define PAGE 4096
-/* What one thread touches between two polls: some 10 milliseconds. */
-#define PART_BYTES ((size_t)1 << 23)
-/* So many parts: less is cleared in a tenth of a second. */
-#define LEAST_PARTS 8
-
-#ifdef HS_TESTING
-static size_t part_bytes = PART_BYTES;
-
-size_t
-hs_test_touch_parts(size_t bytes)
-{
-    const size_t before = part_bytes;
-    part_bytes = bytes;
-    return before;
-}
-#else
-enum { part_bytes = PART_BYTES };
-#endif
-
-typedef struct toucher {
-    volatile char *bytes; /* volatile: what is written is never read, but must be written */
-    size_t         first, end;
-} toucher;
-
-/* A hs_task_fn: part number `task` from the first byte on. */
-static void
-touch_part(void *context, int64_t task)
-{
-    const toucher *doing = context;
-    const size_t   begin = doing->first + (size_t)task * part_bytes;
-    const size_t   left = doing->end - begin;
-    const size_t   end = begin + (left < part_bytes ? left : part_bytes);
-    for (size_t at = begin; at < end; at += PAGE) {
-        doing->bytes[at] = 0;
-    }
-}
-
-static hs_status
-touch(hs_team *team, const hs_options *options, void *bytes, size_t n_bytes)
-{
-    const int n_workers = hs_team_size(team);
-    toucher   doing = {.bytes = bytes, .end = n_bytes};
-    hs_status status = HS_OK;
-    while (status == HS_OK && doing.first < n_bytes) {
-        const size_t  parts = (n_bytes - doing.first + part_bytes - 1) / part_bytes;
-        const int64_t n = parts < (size_t)n_workers ? (int64_t)parts : n_workers;
-        hs_team_run(team, n, touch_part, &doing);
-        doing.first += (size_t)n * part_bytes;
-        status = hs_poll(options, 0.0);
-    }
-    return status;
-}
-
-hs_status
-hs_touch_output(hs_team *team, const hs_options *options, hs_output *output)
-{
-    hs_status status = HS_OK;
-    for (int k = 0; k < HS_QUANTITIES && status == HS_OK; k++) {
-        const unsigned bit = 1u << k;
-        void          *column = hs_output_column(output, bit);
-        const size_t   n_bytes = (size_t)output->n_pairs * hs_output_width(output, bit);
-        if (column != NULL && n_bytes >= LEAST_PARTS * part_bytes) {
-            status = touch(team, options, column, n_bytes);
-        }
-    }
-    return status;
-}
-
 /* Makes the object of a finished search; the public functions that read it and take from
  * it. */
 
@@ -407,8 +358,7 @@ hs_pairs_new(void)
 {
     hs_pairs *pairs = hs_alloc(NULL, HS_FOR_INDICES, 1, sizeof *pairs);
     if (pairs != NULL) {
-        memset(&pairs->output, 0, sizeof pairs->output);
-        memset(&pairs->offsets, 0, sizeof pairs->offsets);
+        pairs->output = pairs->offsets = (hs_output){.account = NULL};
     }
     return pairs;
 }
@@ -482,27 +432,23 @@ hs_pairs_length(const hs_pairs *pairs)
     return pairs != NULL ? pairs->output.n_pairs : 0;
 }
 
-/* Whether it is exactly one HS_WANT_ bit. */
+/* Whether it is exactly one HS_WANT_ bit, of columns that are not the caller's. */
 static bool
-is_quantity(unsigned which)
+is_own(const hs_pairs *pairs, unsigned which)
 {
-    return hs_want_number(which) < HS_QUANTITIES;
+    return pairs != NULL && !pairs->output.fixed && hs_want_number(which) < HS_QUANTITIES;
 }
 
 const void *
 hs_pairs_array(const hs_pairs *pairs, unsigned which)
 {
-    return pairs == NULL || pairs->output.fixed || !is_quantity(which)
-               ? NULL
-               : hs_output_column(&pairs->output, which);
+    return is_own(pairs, which) ? hs_output_column(&pairs->output, which) : NULL;
 }
 
 void *
 hs_pairs_take(hs_pairs *pairs, unsigned which)
 {
-    return pairs == NULL || pairs->output.fixed || !is_quantity(which)
-               ? NULL
-               : output_take(&pairs->output, which);
+    return is_own(pairs, which) ? output_take(&pairs->output, which) : NULL;
 }
 
 int64_t

@@ -2,9 +2,6 @@
 #ifndef HS_COLLECT_COLUMNS_H
 #define HS_COLLECT_COLUMNS_H
 
-#include "../../kernels/kernel.h"
-#include "../base/status.h"
-#include "../memory/memory.h"
 #include "../memory/results.h"
 #include "../threads/call.h"
 
@@ -96,15 +93,9 @@ void hs_output_free(hs_output *output);
  * first thousand writes go to a thousand pages, the caller would not be polled for seconds.
  */
 
-/* Writes to every page of the columns' first n_pairs pairs, if they are so large that it matters:
- * what they hold is lost. HS_ERR_INTERRUPTED when the caller says so. */
+/* Writes to every page that begins in the columns' first n_pairs pairs, if these are so large that
+ * it matters: what they hold is lost. HS_ERR_INTERRUPTED when the caller says so. */
 hs_status hs_touch_output(hs_team *team, const hs_options *options, hs_output *output);
-
-#ifdef HS_TESTING
-/* Bytes that one thread touches at a time; columns of less than eight times as many are left alone.
- * Returns what it was before. */
-size_t hs_test_touch_parts(size_t bytes);
-#endif
 
 /* What a finished search is, for the functions of api/ that make one. */
 

@@ -3,8 +3,6 @@
 #define _POSIX_C_SOURCE 200809L /* for os_thread.h */
 #endif
 #include "parallel.h"
-#include "../base/status.h"
-#include "../base/os.h"
 #include "../base/os_thread.h"
 
 #include <string.h>
@@ -14,24 +12,23 @@
 
 typedef struct hs_commits {
     const hs_crew   *crew;
+    void            *workers;    /* owned; one of each thread, one behind another */
     hs_thread_id     caller;     /* the only thread that may poll */
     volatile int64_t next_range; /* atomic */
     hs_mutex         mutex;      /* guards all below, and the output but for what columns hold */
     hs_condition     changed;    /* due, n_copying or status */
     int64_t          due;        /* the range whose pairs are next in the output */
-    double           done;       /* of the whole search, in order: it never falls */
     int              n_copying;  /* threads that write to columns: these must not move then */
     int              n_working;  /* threads that may still have a range */
     hs_status        status;
     hs_failure       failure; /* of the earliest range that had one */
     int64_t          failed_range;
-    bool             has_enough;
     int64_t          full_range; /* the last one that is written, n_ranges at first */
 } hs_commits;
 
 /* A hs_poll_fn of the threads that may not call the caller's: true until a thread has failed. */
 static bool
-goes_on(void *context, double fraction)
+none_has_failed(void *context, double fraction)
 {
     hs_commits *commits = context;
     (void)fraction;
@@ -41,70 +38,14 @@ goes_on(void *context, double fraction)
     return result;
 }
 
-/* A hs_poll_fn of the caller's thread. What it has done counts once all earlier ranges are written:
- * it may be far ahead of the others, and what is found beyond a full output is given up. */
-static bool
-ask_caller(void *context, double fraction)
-{
-    hs_committer *committer = context;
-    hs_commits   *commits = committer->commits;
-    hs_mutex_lock(&commits->mutex);
-    if (commits->crew->output == NULL || committer->range == commits->due) {
-        commits->done = hs_larger(commits->done, fraction);
-    }
-    const double done = commits->done;
-    hs_mutex_unlock(&commits->mutex);
-    return committer->poll(committer->poll_context, done);
-}
-
-/* Called by the thread itself. The options are changed: threads that may not poll look whether
- * another has failed, and the caller's thread tells a fraction that never falls. */
-static void
-join(hs_commits *commits, hs_committer *committer)
-{
-    hs_options *options = committer->options;
-    committer->failure = HS_NO_FAILURE;
-    committer->commits = commits;
-    committer->poll = options->poll;
-    committer->poll_context = options->poll_context;
-    committer->range = -1;
-    committer->most_bytes = commits->crew->enough > 0 ? HS_COMMIT_BYTES_OF_BLOCKS : HS_COMMIT_BYTES;
-    hs_mutex_lock(&commits->mutex);
-    commits->n_working++;
-    hs_mutex_unlock(&commits->mutex);
-    if (!hs_thread_is(commits->caller)) {
-        options->poll = goes_on;
-        options->poll_context = commits;
-    } else if (options->poll != NULL) {
-        options->poll = ask_caller;
-        options->poll_context = committer;
-    }
-}
-
-/* Takes the next range; false when there is none, when a thread has failed, or when there are
- * enough pairs. */
-static bool
-take_range(hs_committer *committer)
-{
-    hs_commits *commits = committer->commits;
-    hs_mutex_lock(&commits->mutex);
-    const bool more = commits->status == HS_OK && !commits->has_enough;
-    hs_mutex_unlock(&commits->mutex);
-    if (!more) {
-        return false;
-    }
-    committer->range = hs_atomic_add(&commits->next_range, 1);
-    return committer->range < commits->crew->n_ranges;
-}
-
 /* This range has failed: all threads stop. A status that only follows from another failure is not
  * noted. */
 static void
 fail(hs_committer *committer, hs_status status)
 {
     hs_commits *commits = committer->commits;
-    const bool  stopped = status == HS_STOPPED ||
-                         (status == HS_ERR_INTERRUPTED && committer->options->poll == goes_on);
+    const bool  stopped = status == HS_STOPPED || (status == HS_ERR_INTERRUPTED &&
+                                                  committer->options->poll == none_has_failed);
     hs_mutex_lock(&commits->mutex);
     if (!stopped && (commits->status == HS_OK || committer->range < commits->failed_range)) {
         commits->status = status;
@@ -117,15 +58,15 @@ fail(hs_committer *committer, hs_status status)
 
 /* With the mutex held: waits for a change. The caller's thread goes on polling meanwhile. */
 static hs_status
-wait_for_change(hs_commits *commits, const hs_committer *committer, double fraction)
+wait_for_change(hs_commits *commits, const hs_committer *committer)
 {
-    if (committer->options->poll == goes_on) {
+    if (committer->options->poll == none_has_failed) {
         hs_condition_wait(&commits->changed, &commits->mutex);
         return HS_OK;
     }
     hs_condition_wait_briefly(&commits->changed, &commits->mutex);
     hs_mutex_unlock(&commits->mutex);
-    const hs_status status = hs_poll(committer->options, fraction);
+    const hs_status status = hs_poll(committer->options, 0.0); /* what was told last */
     hs_mutex_lock(&commits->mutex);
     return status;
 }
@@ -151,13 +92,11 @@ write_part(hs_committer *committer, const hs_commit_part *part)
     }
     output->n_pairs += n;
     hs_output_touch(output, at, n);
-    commits->has_enough = commits->has_enough || (is_limited && output->n_pairs >= crew->enough);
     if (is_limited && output->n_pairs >= crew->most && commits->full_range == crew->n_ranges) {
         commits->full_range = part->range;
         committer->is_full = !part->is_last;
         hs_condition_wake(&commits->changed);
     }
-    commits->done = hs_larger(commits->done, part->fraction);
     commits->n_copying++;
     if (part->is_last) {
         commits->due++;
@@ -189,7 +128,7 @@ write_parts(hs_committer *committer, bool waits)
             status = write_part(committer, part);
             done++;
         } else if (waits) {
-            status = wait_for_change(commits, committer, part->fraction);
+            status = wait_for_change(commits, committer);
         } else {
             break;
         }
@@ -215,35 +154,11 @@ hs_commit(hs_committer *committer, double fraction, bool ends)
                                       bytes >= committer->most_bytes);
 }
 
-/* There is no range left for this thread. The caller's thread goes on polling for the others. */
-static hs_status
-leave(hs_committer *committer)
-{
-    hs_commits *commits = committer->commits;
-    const bool  waits = committer->options->poll != goes_on;
-    hs_status   status = HS_OK;
-    hs_mutex_lock(&commits->mutex);
-    commits->n_working--;
-    hs_condition_wake(&commits->changed);
-    while (waits && status == HS_OK && commits->status == HS_OK && commits->n_working > 0) {
-        const double left = (double)commits->n_working / (double)commits->crew->n_ranges;
-        status = wait_for_change(commits, committer, hs_larger(1.0 - left, 0.0));
-    }
-    hs_mutex_unlock(&commits->mutex);
-    return status;
-}
-
 static void *
-worker_of(const hs_crew *crew, void *workers, int64_t number)
+worker_of(const hs_commits *commits, int64_t number)
 {
-    return (char *)workers + (size_t)number * crew->worker_size;
+    return (char *)commits->workers + (size_t)number * commits->crew->worker_size;
 }
-
-/* A crew at work. */
-typedef struct sharing {
-    hs_commits commits;
-    void      *workers; /* owned; one of each thread, one behind another */
-} sharing;
 
 /*
  * A hs_task_fn: takes ranges as long as there are any and no thread has failed, and waits until all
@@ -253,12 +168,26 @@ typedef struct sharing {
 static void
 work(void *context, int64_t task)
 {
-    sharing       *shared = context;
-    const hs_crew *crew = shared->commits.crew;
-    hs_committer  *committer = worker_of(crew, shared->workers, task);
+    hs_commits    *commits = context;
+    const hs_crew *crew = commits->crew;
+    hs_committer  *committer = worker_of(commits, task);
     hs_status      status = HS_OK;
-    join(&shared->commits, committer);
-    while (status == HS_OK && take_range(committer)) {
+    hs_mutex_lock(&commits->mutex);
+    commits->n_working++;
+    hs_mutex_unlock(&commits->mutex);
+    if (!hs_thread_is(commits->caller)) { /* which alone may poll */
+        committer->options->poll = none_has_failed;
+        committer->options->poll_context = commits;
+    }
+    while (status == HS_OK) {
+        hs_mutex_lock(&commits->mutex);
+        const bool stops = commits->status != HS_OK ||
+                           (crew->enough > 0 && crew->output->n_pairs >= crew->enough);
+        hs_mutex_unlock(&commits->mutex);
+        committer->range = stops ? crew->n_ranges : hs_atomic_add(&commits->next_range, 1);
+        if (committer->range >= crew->n_ranges) {
+            break;
+        }
         status = crew->search(committer, committer->range);
     }
     if (status == HS_OK && committer->n_parts > 0) {
@@ -267,7 +196,15 @@ work(void *context, int64_t task)
     if (status != HS_OK) {
         fail(committer, status);
     }
-    status = leave(committer);
+    const bool polls = committer->options->poll != none_has_failed;
+    status = HS_OK;
+    hs_mutex_lock(&commits->mutex);
+    commits->n_working--;
+    hs_condition_wake(&commits->changed);
+    while (polls && status == HS_OK && commits->status == HS_OK && commits->n_working > 0) {
+        status = wait_for_change(commits, committer);
+    }
+    hs_mutex_unlock(&commits->mutex);
     if (status != HS_OK) {
         fail(committer, status);
     }
@@ -278,47 +215,50 @@ hs_crew_run(hs_crew *crew, hs_failure *failure)
 {
     hs_account *account = &crew->call->account;
     const int   n = hs_team_size(crew->call->team);
-    sharing     shared = {.commits = {.crew = crew, .full_range = crew->n_ranges}};
-    hs_commits *commits = &shared.commits;
+    hs_commits  commits = {.crew = crew, .full_range = crew->n_ranges};
     int         n_open = 0;
     hs_status   status = HS_OK;
-    shared.workers = hs_alloc(account, HS_FOR_CANDIDATES, n, crew->worker_size);
-    if (shared.workers == NULL) {
+    commits.workers = hs_alloc(account, HS_FOR_CANDIDATES, n, crew->worker_size);
+    if (commits.workers == NULL) {
         return HS_ERR_MEMORY;
     }
-    memset(shared.workers, 0, (size_t)n * crew->worker_size);
+    memset(commits.workers, 0, (size_t)n * crew->worker_size);
     while (n_open < n && status == HS_OK) {
-        hs_committer    *worker = worker_of(crew, shared.workers, n_open++);
+        hs_committer    *worker = worker_of(&commits, n_open++);
         const hs_output *output = crew->output;
         worker->own_options = crew->call->options;
         worker->options = &worker->own_options;
         worker->pairs = &worker->own_pairs;
+        worker->failure = HS_NO_FAILURE;
+        worker->commits = &commits;
+        worker->job = crew->job;
+        worker->most_bytes = crew->enough > 0 ? HS_COMMIT_BYTES_OF_BLOCKS : HS_COMMIT_BYTES;
         if (output != NULL) {
             hs_output_init(NULL, output->ndim, output->columns, output->index_bytes, worker->pairs);
         }
         status = crew->open(crew->job, worker);
     }
     if (status == HS_OK) {
-        commits->caller = hs_thread_self();
-        hs_mutex_init(&commits->mutex);
-        hs_condition_init(&commits->changed);
-        hs_team_run(crew->call->team, n, work, &shared);
-        hs_condition_destroy(&commits->changed);
-        hs_mutex_destroy(&commits->mutex);
-        crew->n_written = commits->due;
-        status = commits->status;
+        commits.caller = hs_thread_self();
+        hs_mutex_init(&commits.mutex);
+        hs_condition_init(&commits.changed);
+        hs_team_run(crew->call->team, n, work, &commits);
+        hs_condition_destroy(&commits.changed);
+        hs_mutex_destroy(&commits.mutex);
+        crew->n_written = commits.due;
+        status = commits.status;
         if (status != HS_OK) {
-            *failure = commits->failure;
+            *failure = commits.failure;
         } else { /* the others may have come last */
-            status = hs_poll(&crew->call->options, crew->output == NULL ? 1.0 : commits->done);
+            status = hs_poll(&crew->call->options, crew->enough > 0 ? 0.0 : 1.0);
         }
     }
     for (int w = 0; w < n_open; w++) {
-        hs_committer *worker = worker_of(crew, shared.workers, w);
+        hs_committer *worker = worker_of(&commits, w);
         crew->close(crew->job, worker);
         hs_output_free(&worker->own_pairs);
     }
-    hs_free(account, shared.workers);
+    hs_free(account, commits.workers);
     return status;
 }
 
@@ -346,7 +286,6 @@ typedef struct walk_job {
 /* What one thread works with; the state of a visitor lies behind it. */
 typedef struct walk_worker {
     hs_committer committer;
-    walk_job    *job;
     hs_keeper    keeper;
 } walk_worker;
 
@@ -355,7 +294,7 @@ static hs_status
 search_range(void *context, int64_t range)
 {
     walk_worker      *me = context;
-    walk_job         *job = me->job;
+    walk_job         *job = me->committer.job;
     hs_walker        *walker = &me->keeper.walker;
     const hs_scanner *scanner = &walker->scanner;
     const int64_t     n = hs_search_asking(job->search)->n;
@@ -406,7 +345,6 @@ open_walk_worker(void *context, void *place)
     hs_walker        *walker = &me->keeper.walker;
     const hs_visitor *visitor = job->visitor;
     hs_status         status;
-    me->job = job;
     me->committer.options = &walker->scanner.options;
     me->keeper.committer = &me->committer;
     if (visitor == NULL) {
@@ -555,9 +493,9 @@ hs_parallel_record(hs_search *search, hs_keeper *keeper, hs_output *output, hs_f
         hs_output_reserve_hint(output, (double)output->n_pairs + search->grid.expected_pairs);
     }
     if (output->fixed || search->call->team != NULL) {
+        hs_bookmark none = {.point = 0};
         /* what is written ahead is kept out of the caller's arrays */
-        walk_job job = {.search = search, .output = output};
-        return walk_together(&job, failure);
+        return hs_parallel_record_on(search, output, 0, &none, failure);
     }
     hs_keeper own; /* its walker is large, and filled before it is read */
     own.committer = NULL;

@@ -2,8 +2,6 @@
 #ifndef HS_COLLECT_PARALLEL_H
 #define HS_COLLECT_PARALLEL_H
 
-#include "columns.h"
-#include "../threads/call.h"
 #include "../search/walk.h"
 #include "record.h"
 
@@ -40,19 +38,31 @@ typedef struct hs_committer {
     hs_options         own_options;
     hs_output          own_pairs;  /* columns as those of the crew's output; not charged */
     hs_failure         failure;    /* of its range that fails */
-    struct hs_commits *commits;    /* borrowed */
+    struct hs_commits *commits;    /* borrowed, as is the next */
+    void              *job;        /* the crew's */
     int64_t            most_bytes; /* held back: one of the two numbers above */
-    hs_poll_fn         poll;       /* as it was before; for the caller's thread */
-    void              *poll_context;
-    int64_t            range;   /* that the thread is working on */
-    int64_t            written; /* of the pairs, those that are in the output already */
-    bool               is_full; /* the output has most pairs, and the range goes on: leave it */
+    int64_t            range;      /* that the thread is working on */
+    int64_t            written;    /* of the pairs, those that are in the output already */
+    bool               is_full;    /* the output has most pairs, and the range goes on: leave it */
+    int64_t            work;       /* since the last poll, as it is told of */
     int                n_parts;
     hs_commit_part     parts[HS_COMMIT_PARTS]; /* that wait until earlier ranges are written */
 } hs_committer;
 
 /* Does the work of one range. */
 typedef hs_status (*hs_range_fn)(void *worker, int64_t range);
+
+/* Notes work of the thread, and polls once there is more than `most` of it. */
+HS_ALWAYS_INLINE hs_status
+hs_note_work(hs_committer *committer, int64_t work, int64_t most, double fraction)
+{
+    committer->work += work;
+    if (committer->work <= most) {
+        return HS_OK;
+    }
+    committer->work = 0;
+    return hs_poll(committer->options, fraction);
+}
 
 /*
  * Commits what has been collected: with `ends` the whole range, else a part of it. Writes it if the

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "record.h"
-#include "../search/search.h"
 #include "../search/limits.h"
 #include "../search/choice.h"
 
@@ -55,67 +54,56 @@ hs_recorder_free(hs_account *account, hs_recorder *recorder)
 /* By the rounded distance where that is far enough from all edges, which are
  * nearly all pairs; the others are decided exactly, those at one edge together. */
 
-/* A pair that is beyond `low` edges, at most `high`. */
-typedef struct open_pair {
-    int32_t hit, si;
-    int32_t low, high;
-} open_pair;
-
-/* Pairs that are to be decided, and where their shells go. */
-typedef struct open_pairs {
-    hs_scanner    *scanner;
-    const int32_t *places;
-    double        *distance;
-    int32_t       *shell;
-    int32_t        n;
-    open_pair      pair[HS_BATCH];
-} open_pairs;
-
-/* Decides the pairs edge by edge, and writes them. */
-static hs_status
-decide_open(open_pairs *open)
+/* The edge in the middle of those that a pair may or may not be beyond; -1: it is decided. */
+static int32_t
+middle_of(const hs_edge_pair *pair)
 {
-    hs_scanner      *scanner = open->scanner;
+    return pair->low < pair->high ? pair->low + (pair->high - pair->low) / 2 : -1;
+}
+
+hs_status
+hs_decide_edges(hs_scanner *scanner, hs_edge_pairs *open)
+{
     hs_pair_batch   *pair_batch = &scanner->pair_batch;
-    const hs_metric *given = &scanner->search->scene.metric;
     const hs_shells *shells = &scanner->search->shells;
+    const hs_metric *given = &scanner->search->scene.metric;
+    hs_metric        metric;
+    int32_t          next[HS_EDGE_PAIRS]; /* the edge of each that is to be decided next */
+    int32_t          of[HS_BATCH];        /* of[e]: which of them is pair e of the batch */
+    uint8_t          within[HS_BATCH];
     scanner->n_ambiguous += open->n;
-    while (open->n > 0) {
-        const int32_t edge = open->pair[0].low;
-        int32_t       of[HS_BATCH], n = 0; /* of[e]: which of them is pair e of the batch */
-        hs_metric     metric;
-        uint8_t       within[HS_BATCH];
+    for (int32_t u = 0; u < open->n; u++) {
+        next[u] = middle_of(&open->pair[u]);
+    }
+    for (int32_t u = 0; u < open->n;) {
+        const int32_t edge = next[u];
+        if (edge < 0) {
+            u++;
+            continue;
+        }
         hs_pair_batch_clear(pair_batch);
-        for (int32_t u = 0; u < open->n; u++) {
-            if (open->pair[u].low == edge) {
-                of[pair_batch->n] = u;
-                hs_pair_batch_put(pair_batch, open->pair[u].si, open->places[open->pair[u].hit]);
+        for (int32_t v = u; v < open->n && pair_batch->n < HS_BATCH; v++) {
+            if (next[v] == edge) {
+                of[pair_batch->n] = v;
+                hs_pair_batch_put(pair_batch, open->pair[v].si, open->pair[v].place);
             }
         }
         const hs_status status = hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
         if (status != HS_OK) {
             return status;
         }
-        hs_metric_init(&metric, given->ndim, given->n_rows,
-                       (const double(*)[HS_MAX_DIM])given->rows, shells->at[edge],
-                       shells->inclusive);
-        hs_decide_pair_batch(scanner, &metric, within);
+        if (edge < shells->n) {
+            hs_metric_init(&metric, given->ndim, given->n_rows,
+                           (const double(*)[HS_MAX_DIM])given->rows, shells->at[edge],
+                           shells->inclusive);
+        }
+        hs_decide_pair_batch(scanner, edge < shells->n ? &metric : given, within);
         for (int32_t e = 0; e < pair_batch->n; e++) {
-            open_pair *pair = &open->pair[of[e]];
+            hs_edge_pair *pair = &open->pair[of[e]];
             pair->high = within[e] ? edge : pair->high;
             pair->low = within[e] ? pair->low : edge + 1;
+            next[of[e]] = middle_of(pair);
         }
-        for (int32_t u = 0; u < open->n; u++) { /* those that are not decided yet stay */
-            const open_pair pair = open->pair[u];
-            if (pair.low < pair.high) {
-                open->pair[n++] = pair;
-            } else {
-                double *distance = &open->distance[pair.hit];
-                *distance = hs_shells_keep(shells, pair.low, *distance);
-                open->shell[pair.hit] = pair.low;
-            }
-        }
-        open->n = n;
     }
     return HS_OK;
 }
@@ -128,30 +116,36 @@ static hs_status
 put_shells(const hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     const hs_shells *shells = &scanner->search->shells;
-    open_pairs       open; /* large, and seldom used: not cleared */
-    open.scanner = scanner;
-    open.places = hits->label;
-    open.distance = hs_recorder_distances(recorder);
-    open.shell = hs_output_next(recorder->output, HS_WANT_SHELL);
+    const int32_t    n = hits->end[hits->n - 1];
+    double          *distance = hs_recorder_distances(recorder);
+    int32_t         *shell = hs_output_next(recorder->output, HS_WANT_SHELL);
+    hs_edge_pairs    open; /* large, and seldom used: not cleared */
+    hs_status        status = HS_OK;
     open.n = 0;
-    if (!hs_shells_find(shells, open.distance, hits->end[hits->n - 1], open.shell)) {
+    if (!hs_shells_find(shells, distance, n, shell)) {
         return HS_OK;
     }
-    for (int32_t t = 0, h = 0; t < hits->n; t++) { /* some distances are too near to an edge */
-        for (; h < hits->end[t]; h++) {
-            int32_t low = open.shell[h], high;
-            hs_shells_range(shells, open.distance[h], &low, &high);
-            open.shell[h] = low;
-            if (low < high) {
-                open.pair[open.n++] = (open_pair){h, first + t, low, high};
+    for (int32_t h = 0, t = 0; h < n && status == HS_OK; h++) { /* some are too near to an edge */
+        while (hits->end[t] <= h) {
+            t++;
+        }
+        int32_t low = shell[h], high;
+        hs_shells_range(shells, distance[h], &low, &high);
+        shell[h] = low;
+        if (low < high) {
+            open.pair[open.n++] = (hs_edge_pair){h, first + t, hits->label[h], low, high};
+        }
+        if (open.n == HS_EDGE_PAIRS || h == n - 1) {
+            status = hs_decide_edges(scanner, &open);
+            for (int32_t u = 0; u < open.n && status == HS_OK; u++) {
+                const hs_edge_pair *pair = &open.pair[u];
+                shell[pair->hit] = pair->low;
+                distance[pair->hit] = hs_shells_keep(shells, pair->low, distance[pair->hit]);
             }
-            const hs_status status = open.n == HS_BATCH ? decide_open(&open) : HS_OK;
-            if (status != HS_OK) {
-                return status;
-            }
+            open.n = 0;
         }
     }
-    return decide_open(&open);
+    return status;
 }
 
 /* Kernels first, one pair at a time where they decline; then to the caller's unit, in
@@ -320,46 +314,6 @@ has_lengths(const hs_search *search)
     return search->limits != NULL && search->limits->supports == NULL;
 }
 
-/* What candidates and points are, of the hits of n points from `first` on. turns: room for those of
- * these points, over the box vectors as given. */
-static void
-describe(const hs_scanner *scanner, int32_t first, int32_t n,
-         int32_t turns[HS_WRITE_MOST_DIM][HS_GROUP_POINTS], hs_write *write)
-{
-    const hs_search  *search = scanner->search;
-    const hs_bins    *asking = hs_search_asking(search), *bins = &search->bins;
-    const hs_lattice *lattice = &search->scene.lattice;
-    write->candidates = scanner->block.candidates;
-    write->place = scanner->block.number;
-    write->x_width = 1;
-    for (int k = 0; k < search->scene.ndim; k++) {
-        write->p[k] = (write->by_S ? asking->originals[k] : asking->x[k]) + first;
-        write->x[k] = write->by_S ? bins->originals[k] : bins->x[k];
-    }
-    for (int r = 0; r < lattice->n_periodic; r++) {
-        write->column[r] = lattice->vector_of_row[r];
-        write->turns[r] = asking->turns.known ? asking->turns.narrow[r] + first : NULL;
-        write->turned[r] = bins->turns.known ? bins->turns.narrow[r] : NULL;
-        write->base[r] = asking->turns.known ? asking->turns.narrow[r][scanner->group.first] : 0;
-    }
-    if (!scanner->pair_batch.is_plain && asking->turns.known) {
-        hs_lattice_few(lattice, write->base, write->base);
-        for (int32_t t = 0; t < n; t++) {
-            int32_t of_point[HS_WRITE_MOST_DIM];
-            for (int r = 0; r < lattice->n_periodic; r++) {
-                of_point[r] = write->turns[r][t];
-            }
-            hs_lattice_few(lattice, of_point, of_point);
-            for (int r = 0; r < lattice->n_periodic; r++) {
-                turns[r][t] = of_point[r];
-            }
-        }
-        for (int r = 0; r < lattice->n_periodic; r++) {
-            write->turns[r] = turns[r];
-        }
-    }
-}
-
 /* The hits of points from `first` on, which are places in the walker's block, as the next pairs of
  * the output, but for HS_WANT_BOTH. *written: whether that was possible; if not, nothing is there
  * yet. HS_OK or HS_ERR_INTERRUPTED. */
@@ -367,19 +321,24 @@ static hs_status
 write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits,
            bool *written)
 {
-    const hs_search *search = scanner->search;
-    const hs_output *output = recorder->output;
-    const bool       is_measured = recorder->columns & HS_MEASURED;
+    const hs_search  *search = scanner->search;
+    const hs_bins    *asking = hs_search_asking(search), *bins = &search->bins;
+    const hs_lattice *lattice = &search->scene.lattice;
+    const hs_output  *output = recorder->output;
+    const bool        is_measured = recorder->columns & HS_MEASURED;
     *written = false;
     if (scanner->block.candidates == NULL || (recorder->columns & HS_WANT_BOTH) ||
         (is_measured && (search->scene.extreme || !search->scene.metric.floats_usable))) {
         return HS_OK;
     }
-    int32_t  turns[HS_WRITE_MOST_DIM][HS_GROUP_POINTS];
+    int32_t  turns[HS_WRITE_MOST_DIM][HS_GROUP_POINTS]; /* over the box vectors as given */
     hs_write write = {.ndim = search->scene.ndim,
                       .is_half = search->is_half,
                       .is_measured = is_measured,
-                      .by_S = search->bins.keeps_originals,
+                      .by_S = bins->keeps_originals,
+                      .candidates = scanner->block.candidates,
+                      .place = scanner->block.number,
+                      .x_width = 1,
                       .metric = &search->scene.metric,
                       .index_bytes = output->index_bytes,
                       .i = hs_output_next(output, HS_WANT_I),
@@ -389,10 +348,35 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
                       .shift = hs_output_next(output, HS_WANT_SHIFT)};
     write.is_shifted = write.by_S || scanner->block.has_images;
     hs_measures_tell(&search->scene, &search->call->options, &write);
-    if (has_lengths(search)) { /* keep_within_lengths, once all is written */
+    if (has_lengths(search)) { /* once all is written */
         write.cutoff = write.largest = INFINITY;
     }
-    describe(scanner, first, hits->n, turns, &write);
+    for (int k = 0; k < search->scene.ndim; k++) {
+        write.p[k] = (write.by_S ? asking->originals[k] : asking->x[k]) + first;
+        write.x[k] = write.by_S ? bins->originals[k] : bins->x[k];
+    }
+    for (int r = 0; r < lattice->n_periodic; r++) {
+        write.column[r] = lattice->vector_of_row[r];
+        write.turns[r] = asking->turns.known ? asking->turns.narrow[r] + first : NULL;
+        write.turned[r] = bins->turns.known ? bins->turns.narrow[r] : NULL;
+        write.base[r] = asking->turns.known ? asking->turns.narrow[r][scanner->group.first] : 0;
+    }
+    if (!scanner->pair_batch.is_plain && asking->turns.known) {
+        hs_lattice_few(lattice, write.base, write.base);
+        for (int32_t t = 0; t < hits->n; t++) {
+            int32_t of_point[HS_WRITE_MOST_DIM];
+            for (int r = 0; r < lattice->n_periodic; r++) {
+                of_point[r] = write.turns[r][t];
+            }
+            hs_lattice_few(lattice, of_point, of_point);
+            for (int r = 0; r < lattice->n_periodic; r++) {
+                turns[r][t] = of_point[r];
+            }
+        }
+        for (int r = 0; r < lattice->n_periodic; r++) {
+            write.turns[r] = turns[r];
+        }
+    }
     if (hs_scanner_load_candidates(scanner, write.base) != HS_OK) {
         return HS_ERR_INTERRUPTED;
     }
@@ -405,54 +389,9 @@ write_hits(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
 /* A batch of hits at a time, looked up, measured by the batch kernel, brought to
  * the caller's unit. */
 
-/* Hits of the batch that is being written. */
-typedef struct batch_part {
-    int32_t first;           /* its first hit */
-    int32_t point[HS_BATCH]; /* number of the point whose hit each one is */
-} batch_part;
-
-/* 1, or -1 for pairs of a half list that are listed the other way round. */
-static void
-find_signs(const hs_pair_batch *pair_batch, const int32_t *point, const int32_t *id, double *sign)
-{
-    int32_t any_own = 0;
-    for (int32_t e = 0; e < pair_batch->n; e++) {
-        sign[e] = id[e] < point[e] ? -1.0 : 1.0;
-        any_own |= id[e] == point[e];
-    }
-    for (int32_t e = 0; any_own && e < pair_batch->n; e++) {
-        int64_t first = 0; /* nonzero component of S */
-        for (int l = 0; id[e] == point[e] && first == 0 && l < pair_batch->n_rows; l++) {
-            first = pair_batch->given[l][e];
-        }
-        sign[e] = first < 0 ? -1.0 : sign[e];
-    }
-}
-
-/* Shifts that only sort the images of one pair may leave out what these images share: the turns by
- * which i and j were wrapped, which can be too many for int32. Returns the first pair whose shift
- * does not fit, or their number. */
-static int32_t
-find_keys(const hs_pair_batch *pair_batch, int64_t keys[][HS_BATCH])
-{
-    const int m = pair_batch->search->scene.lattice.n_periodic;
-    for (int32_t e = 0; e < pair_batch->n; e++) {
-        int64_t image[HS_MAX_DIM], key[HS_MAX_DIM];
-        for (int r = 0; r < m; r++) {
-            image[r] = pair_batch->image[r][e];
-        }
-        if (!hs_lattice_shift(&pair_batch->search->scene.lattice, image, key)) {
-            return e;
-        }
-        for (int l = 0; l < m; l++) {
-            keys[l][e] = key[l];
-        }
-    }
-    return pair_batch->n;
-}
-
-/* S over all box vectors, zero on open ones. Returns the first pair whose S does not fit int32, or
- * their number. */
+/* S over all box vectors, zero on open ones. Shifts that only sort the images of one pair may leave
+ * out what these images share: the turns by which i and j were wrapped, which can be too many for
+ * int32. Returns the first pair whose S does not fit int32, or their number. */
 static int32_t
 put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const double *sign,
            int32_t first)
@@ -468,8 +407,15 @@ put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const d
     if (m < d) {
         memset(to, 0, (size_t)pair_batch->n * (size_t)d * sizeof *to);
     }
-    if (keys_only) {
-        fitting = find_keys(pair_batch, keys);
+    for (int32_t e = 0; keys_only && e < fitting; e++) {
+        int64_t image[HS_MAX_DIM], key[HS_MAX_DIM];
+        for (int r = 0; r < m; r++) {
+            image[r] = pair_batch->image[r][e];
+        }
+        fitting = hs_lattice_shift(lattice, image, key) ? fitting : e;
+        for (int l = 0; e < fitting && l < m; l++) {
+            keys[l][e] = key[l];
+        }
     }
     for (int l = 0; l < m; l++) {
         const int64_t *shifts = keys_only ? keys[l] : pair_batch->given[l];
@@ -485,26 +431,34 @@ put_shifts(const hs_recorder *recorder, const hs_pair_batch *pair_batch, const d
     return fitting;
 }
 
-/* Writes the batch. */
+/* Writes the batch, whose first pair is this hit. */
 static hs_status
-put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
+put_batch(hs_recorder *recorder, hs_scanner *scanner, int32_t first)
 {
     hs_pair_batch    *pair_batch = &scanner->pair_batch;
     const hs_search  *search = scanner->search;
     const hs_options *options = &search->call->options;
     const hs_scale    unscale = hs_measures_unscale(&search->scene);
     const bool        measured = recorder->columns & HS_MEASURED;
-    double            sign[HS_BATCH];
-    const hs_status   status = hs_pair_batch_look_up(pair_batch, measured, &scanner->failed_point);
+    const int32_t    *order = hs_search_asking(search)->order, *si = pair_batch->si;
+    /* Whether pairs may be listed the other way round. */
+    const bool is_turned = search->is_half &&
+                           (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT));
+    double          sign[HS_BATCH]; /* -1 for those */
+    const hs_status status = hs_pair_batch_look_up(pair_batch, measured, &scanner->failed_point);
     if (status != HS_OK) {
         return status;
     }
-    if (!search->is_half) {
-        for (int32_t e = 0; e < pair_batch->n; e++) {
-            sign[e] = 1.0;
+    for (int32_t e = 0; e < pair_batch->n; e++) {
+        sign[e] = 1.0;
+    }
+    for (int32_t e = 0; is_turned && e < pair_batch->n; e++) {
+        const int32_t id = recorder->ids[first + e], point = order[si[e]];
+        int64_t       way = (int64_t)id - point; /* or the first component of S that is not zero */
+        for (int l = 0; way == 0 && l < pair_batch->n_rows; l++) {
+            way = pair_batch->given[l][e];
         }
-    } else if (recorder->columns & (HS_WANT_VECTOR | HS_WANT_SHIFT)) {
-        find_signs(pair_batch, part->point, recorder->ids + part->first, sign);
+        sign[e] = way < 0 ? -1.0 : 1.0;
     }
     if (measured) { /* to the recorder's arrays, in the unit of the metric */
         const hs_batch  batch = hs_pair_batch_view(pair_batch);
@@ -521,19 +475,19 @@ put_batch(hs_recorder *recorder, hs_scanner *scanner, const batch_part *part)
             hs_keep_all_within(recorder->distance, pair_batch->n, options->cutoff,
                                options->inclusive);
         }
-        memcpy(hs_recorder_distances(recorder) + part->first, recorder->distance,
+        memcpy(hs_recorder_distances(recorder) + first, recorder->distance,
                (size_t)pair_batch->n * sizeof(double));
     }
     if (recorder->columns & HS_WANT_VECTOR) {
         const int d = recorder->output->ndim;
         double   *to = hs_output_next(recorder->output, HS_WANT_VECTOR);
-        hs_restore_vectors(to + (int64_t)part->first * d, recorder->vector, sign, pair_batch->n, d,
+        hs_restore_vectors(to + (int64_t)first * d, recorder->vector, sign, pair_batch->n, d,
                            unscale);
     }
     if (recorder->columns & HS_WANT_SHIFT) {
-        const int32_t fitting = put_shifts(recorder, pair_batch, sign, part->first);
+        const int32_t fitting = put_shifts(recorder, pair_batch, sign, first);
         if (fitting < pair_batch->n) {
-            scanner->failed_point = part->point[fitting];
+            scanner->failed_point = order[si[fitting]];
             return HS_ERR_SHIFT_RANGE;
         }
     }
@@ -546,27 +500,24 @@ static hs_status
 put_measures(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     hs_pair_batch *pair_batch = &scanner->pair_batch;
-    batch_part     part = {.first = 0};
+    int32_t        first_hit = 0; /* of the batch */
     hs_pair_batch_clear(pair_batch);
     for (int32_t t = 0, h = 0; t < hits->n; t++) {
         while (h < hits->end[t]) {
             const int32_t taken =
                 hs_pair_batch_add(pair_batch, first + t, hits->label + h, hits->end[t] - h);
-            for (int32_t e = pair_batch->n - taken; e < pair_batch->n; e++) {
-                part.point[e] = hits->point[t];
-            }
             h += taken;
             if (pair_batch->n == HS_BATCH) {
-                const hs_status status = put_batch(recorder, scanner, &part);
+                const hs_status status = put_batch(recorder, scanner, first_hit);
                 if (status != HS_OK) {
                     return status;
                 }
-                part.first = h;
+                first_hit = h;
                 hs_pair_batch_clear(pair_batch);
             }
         }
     }
-    return pair_batch->n > 0 ? put_batch(recorder, scanner, &part) : HS_OK;
+    return pair_batch->n > 0 ? put_batch(recorder, scanner, first_hit) : HS_OK;
 }
 
 #define INDICES (HS_WANT_I | HS_WANT_J | HS_WANT_BOTH)
@@ -601,25 +552,6 @@ put_indices(const hs_recorder *recorder, const hs_search *search, const hs_hits 
     }
 }
 
-/* Distances that have been written, in an exact search: none is left beyond the length of its pair,
- * or beyond the float64 nearest to that. */
-static void
-keep_within_lengths(const hs_recorder *recorder, const hs_scanner *scanner, int32_t first,
-                    const hs_hits *hits)
-{
-    const hs_limits *limits = scanner->search->limits;
-    const hs_scale   unscale = hs_measures_unscale(&scanner->search->scene);
-    double          *distance = hs_recorder_distances(recorder);
-    for (int32_t t = 0, h = 0; distance != NULL && t < hits->n; t++) {
-        for (; h < hits->end[t]; h++) {
-            const int32_t sj = scanner->block.number[hits->label[h]];
-            const hs_dw   limit = hs_limit_of(limits, first + t, sj);
-            distance[h] = hs_keep_within(distance[h], hs_scale_apply(unscale, limit.hi),
-                                         scanner->options.inclusive || limit.lo > 0.0);
-        }
-    }
-}
-
 /* All columns of hits that are places: at once where that is possible, else in batches. */
 static hs_status
 put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits)
@@ -644,13 +576,26 @@ put_places(hs_recorder *recorder, hs_scanner *scanner, int32_t first, const hs_h
     if (status == HS_OK && (recorder->columns & HS_WANT_SHELL)) {
         status = put_shells(recorder, scanner, first, hits);
     }
-    if (status == HS_OK && is_exact && has_lengths(search)) {
-        keep_within_lengths(recorder, scanner, first, hits);
+    double *distance = hs_recorder_distances(recorder);
+    if (status != HS_OK || !is_exact || distance == NULL) {
+        return status;
     }
-    if (status == HS_OK && is_exact && choice != NULL) {
+    if (has_lengths(search)) {
+        /* None is left beyond the length of its pair, or beyond the float64 nearest to that. */
+        const hs_scale unscale = hs_measures_unscale(&search->scene);
+        for (int32_t h = 0, t = 0; h < n; h++) {
+            while (hits->end[t] <= h) {
+                t++;
+            }
+            const int32_t sj = scanner->block.number[hits->label[h]];
+            const hs_dw   limit = hs_limit_of(search->limits, first + t, sj);
+            distance[h] = hs_keep_within(distance[h], hs_scale_apply(unscale, limit.hi),
+                                         scanner->options.inclusive || limit.lo > 0.0);
+        }
+    }
+    if (choice != NULL) {
         /* No pair is nearer than that; only the distance of a point from itself, in rows, is 0. */
-        double *distance = hs_output_next(recorder->output, HS_WANT_DISTANCE);
-        for (int32_t h = 0; distance != NULL && h < n; h++) {
+        for (int32_t h = 0; h < n; h++) {
             distance[h] = distance[h] > 0.0 ? hs_larger(distance[h], choice->min_distance) : 0.0;
         }
     }

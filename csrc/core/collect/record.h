@@ -4,9 +4,6 @@
 
 #include "columns.h"
 #include "../search/scan.h"
-#include "../exact/metric.h"
-#include "../scene/scene.h"
-#include "../../kernels/kernel.h"
 
 /*
  * record.h: turns hits into pairs of the half list: i < j, or for a point and its own image the
@@ -49,6 +46,25 @@ void      hs_recorder_free(hs_account *account, hs_recorder *recorder);
 /* A hs_visit_fn: the hits as the next pairs of the output. HS_ERR_SHIFT_RANGE sets
  * scanner->failed_point. */
 hs_status hs_record_hits(void *recorder, hs_scanner *scanner, int32_t first, const hs_hits *hits);
+
+/* A pair that is beyond `low` edges, at most `high`, of the shells or of a histogram. */
+typedef struct hs_edge_pair {
+    int32_t hit;       /* for the caller */
+    int32_t si, place; /* of the asking point and of the candidate */
+    int32_t low, high;
+} hs_edge_pair;
+
+#define HS_EDGE_PAIRS 1024 /* that are decided together, at most */
+
+typedef struct hs_edge_pairs {
+    int32_t      n;
+    hs_edge_pair pair[HS_EDGE_PAIRS];
+} hs_edge_pairs;
+
+/* Decides exactly which edges the pairs are beyond: low and high agree afterwards. Edges are those
+ * of the search's shells, and the cutoff. HS_ERR_SHIFT_RANGE sets scanner->failed_point;
+ * HS_ERR_INTERRUPTED. */
+hs_status hs_decide_edges(hs_scanner *scanner, hs_edge_pairs *open);
 
 /*
  * d and D of a batch of pairs, with the same bits wherever pairs come from: a walk, the

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "sort_pairs.h"
 #include "../base/sort.h"
-#include "../base/os.h"
 #include "parallel.h"
 
 #include <string.h>
@@ -21,6 +20,7 @@
 typedef struct sorting {
     hs_call         *call;
     const hs_output *found;
+    hs_output       *sorted; /* entries are written behind its pairs, which are counted last */
     const int32_t   *i, *j, *shift; /* its columns; shift NULL where it is not kept */
     int32_t          first_point;
     int64_t          n_rows;
@@ -72,28 +72,47 @@ row_begin(const sorting *all, int64_t row)
     return row > 0 ? all->end[row - 1] : 0;
 }
 
-/* Sorts n images of one pair by S, its last component first: each sort keeps the order of those
- * that agree. spare: room for 2 n numbers. */
+/* A component of S of an entry; of -S the least int32 stays what it is. */
+HS_ALWAYS_INLINE int32_t
+shift_of(const sorting *all, uint64_t entry, int k)
+{
+    const uint32_t shift = (uint32_t)all->shift[pair_of(all, entry) * all->found->ndim + k];
+    return (int32_t)(is_turned(all, entry) ? 0u - shift : shift);
+}
+
+/* Whether S of one entry is less than that of another image of its pair. */
+HS_ALWAYS_INLINE bool
+is_before(const sorting *all, uint64_t one, uint64_t other)
+{
+    const int d = all->found->ndim;
+    int       k = 0;
+    while (k < d && shift_of(all, one, k) == shift_of(all, other, k)) {
+        k++;
+    }
+    return k < d && shift_of(all, one, k) < shift_of(all, other, k);
+}
+
+/* Sorts n images of one pair by S. spare: room for n numbers. */
 static void
 sort_images(const sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
 {
-    uint64_t *keys = spare + n;
-    const int d = all->found->ndim;
-    for (int k = d; k-- > 0;) {
-        for (int64_t e = 0; e < n; e++) { /* of -S, where the least int32 stays what it is */
-            const uint32_t shift = (uint32_t)all->shift[pair_of(all, row[e]) * d + k];
-            const uint32_t own = is_turned(all, row[e]) ? 0u - shift : shift;
-            keys[e] = (uint64_t)(own ^ UINT32_C(0x80000000)) << 32 | (uint64_t)e;
+    for (int64_t length = 1; length < n; length *= 2) { /* of runs in order, merged in twos */
+        int64_t first = 0, middle, end, a, b;
+        for (; first < n; first = end) {
+            middle = n - first < length ? n : first + length;
+            end = n - middle < length ? n : middle + length;
+            a = first;
+            b = middle;
+            for (int64_t to = first; to < end; to++) {
+                const bool takes_b = a == middle || (b < end && is_before(all, row[b], row[a]));
+                spare[to] = takes_b ? row[b++] : row[a++];
+            }
         }
-        hs_sort_numbers(keys, n, 32, spare);
-        memcpy(spare, row, (size_t)n * sizeof *row);
-        for (int64_t e = 0; e < n; e++) {
-            row[e] = spare[(uint32_t)keys[e]];
-        }
+        memcpy(row, spare, (size_t)n * sizeof *row);
     }
 }
 
-/* Puts n entries of one row in the order of (j, S). spare: room for twice as many. */
+/* Puts n entries of one row in the order of (j, S). spare: room for as many. */
 static void
 sort_row(const sorting *all, uint64_t *row, int64_t n, uint64_t *spare)
 {
@@ -138,17 +157,10 @@ row_from(const int64_t *ends, int64_t n, int64_t entry)
 #define ALSO_APART 64
 
 #ifdef HS_TESTING
-static int most_place_bits = 63;
-
-int
-hs_test_sort_place_bits(int bits)
-{
-    const int before = most_place_bits;
-    most_place_bits = bits;
-    return before;
-}
+int hs_test_place_bits = 63;
+#define MOST_PLACE_BITS hs_test_place_bits
 #else
-enum { most_place_bits = 63 };
+#define MOST_PLACE_BITS 63
 #endif
 
 /* A counting sort of pairs, by one of their two numbers, from `least` on; or of entries that have
@@ -291,9 +303,8 @@ deal_out(sorting *all)
     hs_status status = HS_OK;
     all->n_entries = n_pairs << all->both_ways;
     all->place_bits = 64 - hs_count_bits((uint64_t)most | 1);
-    all->has_number = all->n_entries >>
-                          (all->place_bits < most_place_bits ? all->place_bits : most_place_bits) ==
-                      0;
+    const int bits = all->place_bits < MOST_PLACE_BITS ? all->place_bits : MOST_PLACE_BITS;
+    all->has_number = all->n_entries >> bits == 0;
     all->place_mask = all->has_number ? (UINT64_C(1) << all->place_bits) - 1 : UINT64_MAX;
     all->entries = hs_alloc(account, HS_FOR_SORTING, all->n_entries, sizeof *all->entries);
     if (all->entries == NULL) {
@@ -408,58 +419,37 @@ put_some(const sorting *rows, int64_t first, int64_t n, int64_t *row, hs_output 
     sorted->n_pairs += n;
 }
 
-/* Rows are put in order and written. */
-typedef struct row_job {
-    const sorting *all;
-    hs_output     *sorted;
-    int64_t        before; /* pairs that it has already */
-    int64_t        n_ranges;
-} row_job;
-
-/* What one thread works with. */
+/* What one thread works with that puts rows in order and writes them. */
 typedef struct worker {
     hs_committer committer;
-    row_job     *job;
-    hs_output    sorted; /* the job's; where this thread writes next */
+    hs_output    sorted; /* that of all; where this thread writes next */
     uint64_t    *spare;  /* owned */
-    int64_t      work;   /* since the last poll */
 } worker;
-
-static hs_status
-note_work(worker *me, int64_t entries)
-{
-    me->work += entries;
-    if (me->work <= POLL_ENTRIES) {
-        return HS_OK;
-    }
-    me->work = 0;
-    return hs_poll(me->committer.options, 1.0);
-}
 
 /* A hs_range_fn: the rows that begin in a range of entries, as a few rows may have most of them. */
 static hs_status
 do_range(void *context, int64_t range)
 {
     worker        *me = context;
-    const sorting *all = me->job->all;
+    const sorting *all = me->committer.job;
     const int64_t  first_row = row_from(all->end, all->n_rows, range * RANGE_ENTRIES);
     const int64_t  end_row = row_from(all->end, all->n_rows, (range + 1) * RANGE_ENTRIES);
     const int64_t  begin = row_begin(all, first_row);
     const int64_t  end = row_begin(all, end_row);
     hs_status      status = HS_OK;
-    me->sorted.n_pairs = me->job->before + begin;
+    me->sorted.n_pairs = all->sorted->n_pairs + begin;
     if (all->call->team != NULL) { /* before the ranges behind this one write to its last pages */
         hs_output_touch(&me->sorted, me->sorted.n_pairs, end - begin);
     }
     for (int64_t row = first_row; row < end_row && status == HS_OK; row++) {
         const int64_t first = row_begin(all, row), n = all->end[row] - first;
         sort_row(all, all->entries + first, n, me->spare);
-        status = note_work(me, n);
+        status = hs_note_work(&me->committer, n, POLL_ENTRIES, 1.0);
     }
     for (int64_t first = begin, row = first_row; first < end && status == HS_OK; first += PUT) {
         const int64_t n = end - first < PUT ? end - first : PUT;
         put_some(all, first, n, &row, &me->sorted);
-        status = note_work(me, n);
+        status = hs_note_work(&me->committer, n, POLL_ENTRIES, 1.0);
     }
     return status;
 }
@@ -467,32 +457,26 @@ do_range(void *context, int64_t range)
 static hs_status
 open_worker(void *context, void *place)
 {
-    row_job *job = context;
-    worker  *me = place;
-    hs_call *call = job->all->call;
-    me->job = job;
-    me->sorted = *job->sorted;
-    me->spare = hs_alloc(&call->account, HS_FOR_SORTING, 2 * job->all->longest, sizeof *me->spare);
-    /* In a row, images are told apart by 32 bits. */
-    return me->spare != NULL && job->all->longest <= UINT32_MAX ? HS_OK : HS_ERR_MEMORY;
+    const sorting *all = context;
+    worker        *me = place;
+    me->sorted = *all->sorted;
+    me->spare = hs_alloc(&all->call->account, HS_FOR_SORTING, all->longest, sizeof *me->spare);
+    return me->spare != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
 static void
 close_worker(void *context, void *place)
 {
-    const row_job *job = context;
-    hs_free(&job->all->call->account, ((worker *)place)->spare);
+    hs_free(&((const sorting *)context)->call->account, ((worker *)place)->spare);
 }
 
 /* Once all entries are in their rows. */
 static hs_status
-put_all(const sorting *all, hs_output *sorted)
+put_all(sorting *all)
 {
-    hs_call *call = all->call;
-    row_job  job = {.all = all,
-                    .sorted = sorted,
-                    .before = sorted->n_pairs,
-                    .n_ranges = (all->n_entries + RANGE_ENTRIES - 1) / RANGE_ENTRIES};
+    hs_call      *call = all->call;
+    hs_output    *sorted = all->sorted;
+    const int64_t n_ranges = (all->n_entries + RANGE_ENTRIES - 1) / RANGE_ENTRIES;
     if (sorted->fixed && all->n_entries > sorted->capacity) {
         sorted->n_pairs = all->n_entries; /* tells hs_pairs_conclude that they do not fit */
         return HS_OK;
@@ -502,57 +486,44 @@ put_all(const sorting *all, hs_output *sorted)
         return status;
     }
     /* Each thread has room for the longest row: where that is much of all, one thread sorts. */
-    if (call->team != NULL && job.n_ranges > 1 &&
+    if (call->team != NULL && n_ranges > 1 &&
         all->longest <= all->n_entries / hs_team_size(call->team)) {
         hs_failure ignored;
         hs_crew    crew = {.call = call,
-                           .job = &job,
+                           .job = all,
                            .worker_size = sizeof(worker),
                            .open = open_worker,
                            .close = close_worker,
-                           .n_ranges = job.n_ranges,
+                           .n_ranges = n_ranges,
                            .search = do_range};
         status = hs_crew_run(&crew, &ignored);
     } else {
-        worker me = {.committer = {.options = &call->options}};
-        status = open_worker(&job, &me);
-        for (int64_t range = 0; range < job.n_ranges && status == HS_OK; range++) {
+        worker me = {.committer = {.options = &call->options, .job = all}};
+        status = open_worker(all, &me);
+        for (int64_t range = 0; range < n_ranges && status == HS_OK; range++) {
             status = do_range(&me, range);
         }
-        close_worker(&job, &me);
+        close_worker(all, &me);
     }
     sorted->n_pairs += status == HS_OK ? all->n_entries : 0;
     return status;
-}
-
-/* A hs_poll_fn: the caller's, by its options, who is told that all pairs are found. */
-static bool
-poll_when_found(void *context, double fraction)
-{
-    const hs_options *callers = context;
-    (void)fraction;
-    return callers->poll(callers->poll_context, 1.0);
 }
 
 hs_status
 hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_rows, const hs_output *found,
               bool both_ways, int64_t *offsets, hs_output *sorted)
 {
-    hs_options *options = &call->options, callers = *options;
-    sorting     all = {.call = call,
-                       .first_point = first_point,
-                       .n_rows = n_rows,
-                       .found = found,
-                       .i = hs_output_column(found, HS_WANT_I),
-                       .j = hs_output_column(found, HS_WANT_J),
-                       .shift = hs_output_column(found, HS_WANT_SHIFT),
-                       .both_ways = both_ways ? 1 : 0,
-                       .end = offsets};
-    hs_status   status = HS_OK;
-    if (callers.poll != NULL) {
-        options->poll = poll_when_found;
-        options->poll_context = &callers;
-    }
+    sorting   all = {.call = call,
+                     .first_point = first_point,
+                     .n_rows = n_rows,
+                     .found = found,
+                     .sorted = sorted,
+                     .i = hs_output_column(found, HS_WANT_I),
+                     .j = hs_output_column(found, HS_WANT_J),
+                     .shift = hs_output_column(found, HS_WANT_SHIFT),
+                     .both_ways = both_ways ? 1 : 0,
+                     .end = offsets};
+    hs_status status = HS_OK;
     if (offsets == NULL) {
         all.end = hs_alloc(&call->account, HS_FOR_SORTING, n_rows, sizeof *all.end);
         status = all.end != NULL ? HS_OK : HS_ERR_MEMORY;
@@ -561,7 +532,7 @@ hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_rows, const hs_outpu
         status = deal_out(&all);
     }
     if (status == HS_OK) {
-        status = put_all(&all, sorted);
+        status = put_all(&all);
     }
     hs_free(&call->account, all.entries);
     if (offsets != NULL) {
@@ -569,6 +540,5 @@ hs_sort_pairs(hs_call *call, int32_t first_point, int64_t n_rows, const hs_outpu
     } else {
         hs_free(&call->account, all.end);
     }
-    *options = callers;
     return status;
 }

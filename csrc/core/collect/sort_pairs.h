@@ -3,14 +3,13 @@
 #define HS_COLLECT_SORT_PAIRS_H
 
 #include "columns.h"
-#include "../threads/call.h"
 #include "../search/search.h"
 
 /* sort_pairs.h: the ascending order of pairs. */
 
 #ifdef HS_TESTING
-/* How many bits a place may have at most. Returns what it was before. */
-int hs_test_sort_place_bits(int bits);
+/* How many bits a place may have at most. */
+extern int hs_test_place_bits;
 #endif
 
 /* The columns that must be found, so that pairs can be put in order and have all that is wanted. */

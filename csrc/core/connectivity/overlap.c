@@ -131,10 +131,11 @@ typedef struct merging {
 typedef struct intersection_worker {
     hs_committer   committer;
     const merging *all;
-    uint64_t      *marked; /* owned; a bit for each point */
-    int32_t       *common; /* owned; as many as the longest row has, and two */
-    int32_t       *shift;  /* owned; of each of them from i, if there are any */
-    int64_t       *next;   /* owned; where each list goes on, and one more */
+    void          *memory; /* owned: of all arrays */
+    uint64_t      *marked; /* a bit for each point */
+    int32_t       *common; /* as many as the longest row has, and two */
+    int32_t       *shift;  /* of each of them from i, if there are any */
+    int64_t       *next;   /* where each list goes on, and one more */
     int64_t        looked;
 } intersection_worker;
 
@@ -142,16 +143,18 @@ static hs_status
 open_intersection_worker(void *context, void *place)
 {
     const merging       *all = context;
-    hs_account          *account = &all->call->account;
     intersection_worker *me = place;
     const int64_t        n = all->longest + 2, n_words = all->map.n / 64 + 1;
+    const int64_t        n_shifts = all->half.shift != NULL ? n * all->half.ndim : 0;
+    hs_parts             parts;
+    hs_parts_begin(&parts);
+    hs_parts_add(&parts, (void **)&me->common, n, sizeof *me->common);
+    hs_parts_add(&parts, (void **)&me->shift, n_shifts, sizeof *me->shift);
+    hs_parts_add(&parts, (void **)&me->next, all->map.n_lists + 1, sizeof *me->next);
+    hs_parts_add(&parts, (void **)&me->marked, n_words, sizeof *me->marked);
     me->all = all;
-    me->common = hs_alloc(account, HS_FOR_SORTING, n, sizeof *me->common);
-    me->shift = hs_alloc(account, HS_FOR_SORTING, all->half.shift != NULL ? n * all->half.ndim : 0,
-                         sizeof *me->shift);
-    me->next = hs_alloc(account, HS_FOR_SORTING, all->map.n_lists + 1, sizeof *me->next);
-    me->marked = hs_alloc(account, HS_FOR_SORTING, n_words, sizeof *me->marked);
-    if (me->common == NULL || me->shift == NULL || me->next == NULL || me->marked == NULL) {
+    me->memory = hs_parts_alloc(&all->call->account, HS_FOR_SORTING, &parts);
+    if (me->memory == NULL) {
         return HS_ERR_MEMORY;
     }
     memset(me->marked, 0, (size_t)n_words * sizeof *me->marked);
@@ -161,13 +164,7 @@ open_intersection_worker(void *context, void *place)
 static void
 close_intersection_worker(void *context, void *place)
 {
-    const merging       *all = context;
-    hs_account          *account = &all->call->account;
-    intersection_worker *me = place;
-    hs_free(account, me->marked);
-    hs_free(account, me->common);
-    hs_free(account, me->shift);
-    hs_free(account, me->next);
+    hs_free(&((const merging *)context)->call->account, ((intersection_worker *)place)->memory);
 }
 
 /* Marks the neighbours of point i, or takes the marks back. */
@@ -441,6 +438,8 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
 
 /* Points that are met between two calls of poll(). */
 #define POLL_MET (INT64_C(1) << 22)
+/* Entries whose arrays have sizes that integers hold; more fit no memory. */
+#define MOST_ENTRIES (INT64_C(1) << 50)
 /* Points of a range: some HS_RANGE_BYTES, and half a millisecond. */
 #define RANGE_POINTS 64
 
@@ -448,8 +447,10 @@ hs_connectivity_intersect(const hs_points *points, const hs_box *box, const hs_h
 typedef struct product {
     hs_call *call;
     int64_t  n;
-    int      ndim; /* of shifts; 0: there are none */
-    /* What each point gathers, itself first. Owned, as all arrays. */
+    int      ndim;   /* of shifts; 0: there are none */
+    int64_t  most;   /* points, or images, that one meets */
+    void    *memory; /* owned: of all arrays but the last */
+    /* What each point gathers, itself first. */
     int64_t *first;
     int32_t *index, *shift;
     int32_t *order, *place; /* the points along the Z curve through them, and where each is on it */
@@ -465,12 +466,12 @@ typedef struct product {
 typedef struct overlap_worker {
     hs_committer committer;
     product     *all;
-    uint64_t    *bits;    /* owned; of points that are met, and of their words that have any */
-    int32_t     *last;    /* owned; of images: the number of what was met last of each point, */
-    int32_t     *met;     /* owned; and of what was met of it before each of these; -1: nothing */
-    int32_t     *shift;   /* owned; of each of them, and of those of one point that differ */
-    int32_t     *scratch; /* owned; all points */
-    int64_t      room;
+    void        *memory;  /* owned: of all arrays */
+    uint64_t    *bits;    /* of points that are met, and of their words that have any */
+    int32_t     *last;    /* of images: the number of what was met last of each point, */
+    int32_t     *met;     /* and of what was met of it before each of these; -1: nothing */
+    int32_t     *shift;   /* of each of them, and of those of one point that differ */
+    int32_t     *scratch; /* all points */
     int64_t      looked;
 } overlap_worker;
 
@@ -479,13 +480,18 @@ open_overlap_worker(void *context, void *place)
 {
     product        *all = context;
     overlap_worker *me = place;
+    const int64_t   n_bits = all->n / 64 + all->n / 4096 + 2, d = all->ndim;
+    const int64_t   n_last = d > 0 ? all->n : 0, n_met = d > 0 ? all->most : 0;
+    hs_parts        parts;
+    hs_parts_begin(&parts);
+    hs_parts_add(&parts, (void **)&me->bits, n_bits, sizeof *me->bits);
+    hs_parts_add(&parts, (void **)&me->last, n_last, sizeof *me->last);
+    hs_parts_add(&parts, (void **)&me->met, n_met, sizeof *me->met);
+    hs_parts_add(&parts, (void **)&me->shift, 2 * n_met * d, sizeof *me->shift);
+    hs_parts_add(&parts, (void **)&me->scratch, all->n, sizeof *me->scratch);
     me->all = all;
-    const int64_t n_bits = all->n / 64 + all->n / 4096 + 2;
-    me->bits = hs_alloc(&all->call->account, HS_FOR_SORTING, n_bits, sizeof *me->bits);
-    me->last =
-        hs_alloc(&all->call->account, HS_FOR_SORTING, all->ndim > 0 ? all->n : 0, sizeof *me->last);
-    me->scratch = hs_alloc(&all->call->account, HS_FOR_SORTING, all->n, sizeof *me->scratch);
-    if (me->bits == NULL || me->last == NULL || me->scratch == NULL) {
+    me->memory = hs_parts_alloc(&all->call->account, HS_FOR_SORTING, &parts);
+    if (me->memory == NULL) {
         return HS_ERR_MEMORY;
     }
     memset(me->bits, 0, (size_t)n_bits * sizeof *me->bits);
@@ -495,13 +501,7 @@ open_overlap_worker(void *context, void *place)
 static void
 close_overlap_worker(void *context, void *place)
 {
-    hs_account     *account = &((product *)context)->call->account;
-    overlap_worker *me = place;
-    hs_free(account, me->bits);
-    hs_free(account, me->last);
-    hs_free(account, me->scratch);
-    hs_free(account, me->met);
-    hs_free(account, me->shift);
+    hs_free(&((product *)context)->call->account, ((overlap_worker *)place)->memory);
 }
 
 /* Sets bits of one word; returns what it was. */
@@ -535,35 +535,6 @@ clear_bits(const overlap_worker *me, int32_t *to)
     return n;
 }
 
-static hs_status
-make_room(overlap_worker *me, int32_t i)
-{
-    const product *all = me->all;
-    hs_account    *account = &all->call->account;
-    const int      d = all->ndim;
-    int64_t        most = 0;
-    for (int64_t e = all->first[i]; e < all->first[i + 1]; e++) {
-        const int32_t k = all->index[e];
-        most += all->by_end[k] - all->by_first[k];
-    }
-    me->looked += most;
-    if (most > INT32_MAX) {
-        return HS_ERR_TOO_MANY;
-    }
-    if (d > 0 && most > me->room) {
-        hs_free(account, me->met);
-        hs_free(account, me->shift);
-        me->room = 0;
-        me->met = hs_alloc(account, HS_FOR_SORTING, most, sizeof *me->met);
-        me->shift = hs_alloc(account, HS_FOR_SORTING, most * d, 2 * sizeof *me->shift);
-        if (me->met == NULL || me->shift == NULL) {
-            return HS_ERR_MEMORY;
-        }
-        me->room = most;
-    }
-    return HS_OK;
-}
-
 /* Sets the bits of what gathers what i gathers; writes down *n images, each at least once. */
 HS_ALWAYS_INLINE hs_status
 meet(overlap_worker *me, int32_t i, const int d, int64_t *n)
@@ -572,6 +543,7 @@ meet(overlap_worker *me, int32_t i, const int d, int64_t *n)
     int64_t        at = 0;
     for (int64_t e = all->first[i]; e < all->first[i + 1]; e++) {
         const int32_t k = all->index[e];
+        me->looked += all->by_end[k] - all->by_first[k];
         for (int64_t b = all->by_first[k]; b < all->by_end[k]; b++) {
             const int32_t  j = all->by[b], w = d > 0 ? j >> 6 : j;
             const uint64_t bit = d > 0 ? UINT64_C(1) << (j & 63) : all->by_bits[b];
@@ -620,12 +592,9 @@ add_shift(const int32_t *shift, int ndim, int32_t *to, int64_t n)
 HS_ALWAYS_INLINE hs_status
 write_row(overlap_worker *me, int32_t i, const int d, int64_t *length)
 {
-    hs_output *pairs = me->committer.pairs;
-    int64_t    n, at = 0;
-    hs_status  status = make_room(me, i);
-    if (status == HS_OK) {
-        status = meet(me, i, d, &n);
-    }
+    hs_output    *pairs = me->committer.pairs;
+    int64_t       n, at = 0;
+    hs_status     status = meet(me, i, d, &n);
     const int64_t n_met = status == HS_OK ? clear_bits(me, me->scratch) : 0;
     if (status == HS_OK) {
         status = hs_output_reserve(pairs, d > 0 ? n : n_met, 0.0);
@@ -637,7 +606,7 @@ write_row(overlap_worker *me, int32_t i, const int d, int64_t *length)
             *to_shift = hs_output_next(pairs, HS_WANT_SHIFT);
     for (int64_t e = 0; e < n_met; e++) {
         const int32_t j = d > 0 ? me->scratch[e] : me->all->order[me->scratch[e]];
-        int32_t      *own = me->shift + me->room * d;
+        int32_t      *own = me->shift + me->all->most * d;
         int64_t       n_own = 0;
         if (d == 0 && j != i) {
             (void)set_bits(me, j >> 6, UINT64_C(1) << (j & 63));
@@ -684,18 +653,28 @@ multiply_range(void *context, int64_t range)
     return hs_commit(&me->committer, (double)last / (double)n, true);
 }
 
-/* Copies what each point gathers, and puts the point itself first, with a shift of zero.
- * HS_ERR_ARGUMENT where these are no rows. */
+/* Room for all arrays. Copies what each point gathers, and puts the point itself first, with a
+ * shift of zero. HS_ERR_ARGUMENT where these are no rows. */
 static hs_status
 copy_rows(hs_account *account, const hs_index_rows *given, product *doing)
 {
     const int     d = doing->ndim;
     const int64_t n = given->n + given->n_indices; /* entries */
     int64_t       at = 0;
-    doing->first = hs_alloc(account, HS_FOR_SORTING, doing->n + 1, sizeof *doing->first);
-    doing->index = hs_alloc(account, HS_FOR_SORTING, n, sizeof *doing->index);
-    doing->shift = hs_alloc(account, HS_FOR_SORTING, n * d, sizeof *doing->shift);
-    if (doing->first == NULL || doing->index == NULL || doing->shift == NULL) {
+    hs_parts      parts;
+    hs_parts_begin(&parts);
+    hs_parts_add(&parts, (void **)&doing->first, doing->n + 1, sizeof *doing->first);
+    hs_parts_add(&parts, (void **)&doing->index, n, sizeof *doing->index);
+    hs_parts_add(&parts, (void **)&doing->shift, n * d, sizeof *doing->shift);
+    hs_parts_add(&parts, (void **)&doing->order, doing->n, sizeof *doing->order);
+    hs_parts_add(&parts, (void **)&doing->place, doing->n, sizeof *doing->place);
+    hs_parts_add(&parts, (void **)&doing->by_first, doing->n + 1, sizeof *doing->by_first);
+    hs_parts_add(&parts, (void **)&doing->by_end, doing->n + 1, sizeof *doing->by_end);
+    hs_parts_add(&parts, (void **)&doing->by, n, sizeof *doing->by);
+    hs_parts_add(&parts, (void **)&doing->by_shift, n * d, sizeof *doing->by_shift);
+    hs_parts_add(&parts, (void **)&doing->by_bits, d > 0 ? 0 : n, sizeof *doing->by_bits);
+    doing->memory = n < MOST_ENTRIES ? hs_parts_alloc(account, HS_FOR_SORTING, &parts) : NULL;
+    if (doing->memory == NULL) {
         return HS_ERR_MEMORY;
     }
     for (int64_t i = 0; i < given->n; i++) {
@@ -737,8 +716,7 @@ put_in_order(hs_account *account, const hs_points *points, product *doing)
     int32_t      *spare = hs_alloc(account, HS_FOR_SORTING, n, sizeof *spare);
     double        low[HS_MAX_DIM], high[HS_MAX_DIM];
     hs_status     status = HS_ERR_MEMORY;
-    doing->order = hs_alloc(account, HS_FOR_SORTING, n, 2 * sizeof *doing->order);
-    if (doing->order != NULL && x != NULL && keys != NULL && spare != NULL) {
+    if (x != NULL && keys != NULL && spare != NULL) {
         hs_keys sort = {.keys = keys,
                         .ids = doing->order,
                         .spare_keys = keys + n,
@@ -761,7 +739,6 @@ put_in_order(hs_account *account, const hs_points *points, product *doing)
             doing->order[i] = (int32_t)i;
         }
         status = hs_keys_sort(&sort, 0, n);
-        doing->place = doing->order + n;
         for (int64_t p = 0; p < n; p++) {
             doing->place[doing->order[p]] = (int32_t)p;
         }
@@ -772,22 +749,12 @@ put_in_order(hs_account *account, const hs_points *points, product *doing)
     return status;
 }
 
-/* Finds by which points each one is gathered. */
+/* Finds by which points each one is gathered, and how many one meets. */
 static hs_status
-turn_rows(hs_account *account, product *doing)
+turn_rows(product *doing)
 {
     const int64_t n = doing->n, n_entries = doing->first[n];
     const int     d = doing->ndim;
-    doing->by_first = hs_alloc(account, HS_FOR_SORTING, n + 1, 2 * sizeof *doing->by_first);
-    doing->by = hs_alloc(account, HS_FOR_SORTING, n_entries, sizeof *doing->by);
-    doing->by_shift = hs_alloc(account, HS_FOR_SORTING, n_entries * d, sizeof *doing->by_shift);
-    doing->by_bits =
-        hs_alloc(account, HS_FOR_SORTING, d > 0 ? 0 : n_entries, sizeof *doing->by_bits);
-    if (doing->by_first == NULL || doing->by == NULL || doing->by_shift == NULL ||
-        doing->by_bits == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    doing->by_end = doing->by_first + n + 1;
     memset(doing->by_first, 0, (size_t)(n + 1) * sizeof *doing->by_first);
     for (int64_t e = 0; e < n_entries; e++) {
         doing->by_first[doing->index[e] + 1]++;
@@ -811,7 +778,14 @@ turn_rows(hs_account *account, product *doing)
             doing->by_end[k] = at + 1;
         }
     }
-    return HS_OK;
+    for (int64_t i = 0; i < n; i++) {
+        int64_t met = 0;
+        for (int64_t e = doing->first[i]; e < doing->first[i + 1]; e++) {
+            met += doing->by_end[doing->index[e]] - doing->by_first[doing->index[e]];
+        }
+        doing->most = met > doing->most ? met : doing->most;
+    }
+    return doing->most > INT32_MAX ? HS_ERR_TOO_MANY : HS_OK;
 }
 
 hs_status
@@ -850,7 +824,7 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
         status = put_in_order(account, points, &doing);
     }
     if (status == HS_OK) {
-        status = turn_rows(account, &doing);
+        status = turn_rows(&doing);
     }
     if (status == HS_OK) {
         status = hs_output_open_offsets(account, doing.n + 1, &doing.offsets, &offsets);
@@ -880,11 +854,7 @@ hs_connectivity_overlap(const hs_points *points, const hs_index_rows *gather,
     if (status == HS_ERR_MEMORY) {
         failure->expected_pairs = (double)doing.all.n_pairs;
     }
-    void *const owned[] = {doing.first,    doing.index, doing.shift,    doing.order,
-                           doing.by_first, doing.by,    doing.by_shift, doing.by_bits};
-    for (size_t k = 0; k < sizeof owned / sizeof owned[0]; k++) {
-        hs_free(account, owned[k]);
-    }
+    hs_free(account, doing.memory);
     hs_output_free(&doing.offsets);
     hs_output_free(&doing.all);
     hs_node_map_free(account, &map);

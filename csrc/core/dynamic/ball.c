@@ -23,9 +23,10 @@
  * coordinates are wrong by, in heights. Points that are ROWS_AWAY are rounded besides.
  */
 static double
-leak_of(const hs_lattice *lattice, int k, double max_radius, const hs_axes *so_far)
+leak_of(const hs_dynamic *list, int k, const double *so_far)
 {
-    double leak = 0.0;
+    const hs_lattice *lattice = &list->lattice;
+    double            leak = 0.0;
     for (int j = 0; j < lattice->ndim; j++) {
         const int r = lattice->row_of_axis[j];
         double    along = 0.0, size = 0.0;
@@ -38,7 +39,7 @@ leak_of(const hs_lattice *lattice, int k, double max_radius, const hs_axes *so_f
         }
         const double miss =
             (j == k ? 0.0 : fabs(along)) + 0x1p-44 * size + lattice->ndim * lattice->row_error[r];
-        leak += ((max_radius + so_far->axis[j].leak) / lattice->period[j] + ROWS_AWAY) * miss;
+        leak += ((list->max_radius + so_far[j]) / lattice->period[j] + ROWS_AWAY) * miss;
         leak += hs_axis_rounding(lattice->ndim) * ROWS_AWAY *
                 hs_axis_terms(lattice, lattice->rows[r], k);
     }
@@ -46,12 +47,11 @@ leak_of(const hs_lattice *lattice, int k, double max_radius, const hs_axes *so_f
 }
 
 void
-hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool one_cell,
-             double max_radius)
+hs_axes_init(hs_dynamic *list, double cell_size, bool one_cell)
 {
-    axes->ndim = lattice->ndim;
+    const hs_lattice *lattice = &list->lattice;
     for (int k = 0; k < lattice->ndim; k++) {
-        hs_axis *axis = &axes->axis[k];
+        hs_axis *axis = &list->axis[k];
         *axis = (hs_axis){.row = lattice->row_of_axis[k]};
         if (axis->row >= 0) {
             const double fitting = one_cell ? 1.0 : floor(lattice->period[k] / cell_size);
@@ -72,13 +72,16 @@ hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool on
     }
     /* Leaks twice: those along one axis lead to more images along others. */
     for (int pass = 0; pass < 2 && !lattice->aligned; pass++) {
-        const hs_axes so_far = *axes;
+        double so_far[HS_MAX_DIM];
         for (int k = 0; k < lattice->ndim; k++) {
-            axes->axis[k].leak = leak_of(lattice, k, max_radius, &so_far);
+            so_far[k] = list->axis[k].leak;
+        }
+        for (int k = 0; k < lattice->ndim; k++) {
+            list->axis[k].leak = leak_of(list, k, so_far);
         }
     }
     for (int k = 0; k < lattice->ndim; k++) {
-        hs_axis *axis = &axes->axis[k];
+        hs_axis *axis = &list->axis[k];
         axis->farthest = axis->row >= 0 ? HS_WRAP_LIMIT * axis->period : INFINITY;
         for (int r = 0; r < lattice->n_periodic; r++) {
             axis->farthest += hs_axis_terms(lattice, lattice->rows[r], k);
@@ -137,11 +140,11 @@ compare(const void *one, const void *other)
  * that their squares are ordinary numbers. In skewed boxes the least distance is the sum of squares
  * of those between faces: an order, not a bound. */
 static void
-fill(const hs_axes *axes, const hs_lattice *lattice, double unit, int reach, item *items,
-     const hs_offsets *offsets)
+fill(const hs_dynamic *list, double unit, int reach, item *items)
 {
-    const int     d = axes->ndim, side = 2 * reach + 1;
-    const int64_t n = offsets->n[reach];
+    const hs_offsets *offsets = &list->offsets;
+    const int         d = list->lattice.ndim, side = 2 * reach + 1;
+    const int64_t     n = offsets->n[reach];
     for (int64_t i = 0; i < n; i++) {
         double  centre[HS_MAX_DIM] = {0};
         int64_t rest = i;
@@ -153,10 +156,10 @@ fill(const hs_axes *axes, const hs_lattice *lattice, double unit, int reach, ite
         for (int k = 0; k < d; k++) {
             const int    offset = items[i].slot[k] - HS_MOST_REACH;
             const int    between = offset > 1 ? offset - 1 : offset < -1 ? -offset - 1 : 0;
-            const double width = isfinite(axes->axis[k].width) ? axes->axis[k].width / unit : 0.0;
+            const double width = isfinite(list->axis[k].width) ? list->axis[k].width / unit : 0.0;
             items[i].least += between * width * (between * width);
             for (int c = 0; c < d; c++) {
-                centre[c] += offset * width * lattice->direction[k][c];
+                centre[c] += offset * width * list->lattice.direction[k][c];
             }
         }
         for (int c = 0; c < d; c++) {
@@ -170,20 +173,21 @@ fill(const hs_axes *axes, const hs_lattice *lattice, double unit, int reach, ite
 }
 
 bool
-hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *lattice,
-                double max_radius)
+hs_offsets_init(hs_dynamic *list)
 {
+    hs_offsets *offsets = &list->offsets;
+    const int   d = list->lattice.ndim;
     double needed = 0.0, unit = 0.0; /* cells to a side, and one more for rounding; widest cell */
     memset(offsets, 0, sizeof *offsets);
-    for (int k = 0; k < axes->ndim; k++) {
-        if (isfinite(axes->axis[k].width)) {
-            needed = hs_larger(ceil(max_radius / axes->axis[k].width) + 1.0, needed);
-            unit = hs_larger(axes->axis[k].width, unit);
+    for (int k = 0; k < d; k++) {
+        if (isfinite(list->axis[k].width)) {
+            needed = hs_larger(ceil(list->max_radius / list->axis[k].width) + 1.0, needed);
+            unit = hs_larger(list->axis[k].width, unit);
         }
     }
     for (int r = 0; r <= HS_MOST_REACH && r <= needed; r++) {
         double n = 1.0;
-        for (int k = 0; k < axes->ndim; k++) {
+        for (int k = 0; k < d; k++) {
             n *= 2 * r + 1;
         }
         if (n > HS_MOST_OFFSETS) {
@@ -191,13 +195,13 @@ hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *latt
         }
         offsets->reach = r;
         offsets->n[r] = (int64_t)n;
-        offsets->at[r + 1] = offsets->at[r] + (int64_t)n * axes->ndim;
+        offsets->at[r + 1] = offsets->at[r] + (int64_t)n * d;
     }
     const int last = offsets->reach;
     offsets->slot = hs_alloc(NULL, HS_FOR_STENCIL, offsets->at[last + 1], 1);
     item *items = hs_alloc(NULL, HS_FOR_STENCIL, offsets->n[last], sizeof *items);
     for (int r = 0; r <= last && offsets->slot != NULL && items != NULL; r++) {
-        fill(axes, lattice, unit > 0.0 ? unit : 1.0, r, items, offsets);
+        fill(list, unit > 0.0 ? unit : 1.0, r, items);
     }
     hs_free(NULL, items);
     if (items == NULL) {
@@ -253,41 +257,11 @@ set_thresholds(const hs_ball *ball, double a, hs_ball_image *image)
  * ROWS_AWAY sum_r |B_rc|, the last of which the leak stands for. In directions that the box does
  * not move, X and P are what was given.
  */
-HS_ALWAYS_INLINE hs_status
-init_in(hs_ball *ball, const hs_dynamic *list, const double *position, hs_failure *failure,
-        const int ndim)
-{
-    const hs_status status = hs_dynamic_place_in(list, position, &ball->centre, failure, ndim);
-    if (status != HS_OK) {
-        return status;
-    }
-    const double least = hs_larger(ball->radius, LEAST_BALL);
-    const double wrapping = 0x1p-90 * (list->magnitude + ball->centre.magnitude);
-    double       images = 1.0, size = list->spread + ball->radius;
-    for (int k = 0; k < ndim && !list->lattice.aligned; k++) {
-        size += list->moves[k] ? fabs(ball->centre.x[k]) : 0.0;
-    }
-    ball->error = list->lattice.aligned ? 0.0 : 0x1p-48 * size + wrapping;
-    for (int k = 0; k < ndim; k++) {
-        const double error = list->lattice.aligned
-                                 ? 0.0
-                                 : hs_axis_rounding(ndim) * (2.0 * ball->centre.terms[k] +
-                                                             HS_MAX_DIM * ball->radius) +
-                                       wrapping + list->axes.axis[k].leak;
-        hs_axis_span(&list->axes.axis[k], ball->centre.t[k], ball->centre.index[k], least + error,
-                     error, &ball->span[k]);
-        images *= (double)(ball->span[k].most - ball->span[k].least) + 1.0;
-        ball->home.centre[k] = ball->centre.x[k];
-        ball->home.image[k] = 0;
-    }
-    set_thresholds(ball, list->lattice.aligned ? 0.0 : ndim * ball->error, &ball->home);
-    return images <= MOST_BALL_IMAGES ? HS_OK : HS_ERR_SHIFT_RANGE;
-}
-
 hs_status
 hs_ball_init(hs_ball *ball, const hs_dynamic *list, const double *position, double radius,
              hs_failure *failure)
 {
+    const int    d = list->lattice.ndim;
     const double least = hs_larger(radius, LEAST_BALL);
     ball->list = list;
     ball->radius = radius;
@@ -301,11 +275,29 @@ hs_ball_init(hs_ball *ball, const hs_dynamic *list, const double *position, doub
         failure->value = radius;
         return HS_ERR_CUTOFF;
     }
-    switch (list->lattice.ndim) {
-    case 2: return init_in(ball, list, position, failure, 2);
-    case 3: return init_in(ball, list, position, failure, 3);
-    default: return init_in(ball, list, position, failure, list->lattice.ndim);
+    const hs_status status = hs_dynamic_place(list, position, &ball->centre, failure);
+    if (status != HS_OK) {
+        return status;
     }
+    const double wrapping = 0x1p-90 * (list->magnitude + ball->centre.magnitude);
+    double       images = 1.0, size = list->spread + radius;
+    for (int k = 0; k < d && !list->lattice.aligned; k++) {
+        size += list->moves[k] ? fabs(ball->centre.x[k]) : 0.0;
+    }
+    ball->error = list->lattice.aligned ? 0.0 : 0x1p-48 * size + wrapping;
+    for (int k = 0; k < d; k++) {
+        const double error =
+            list->lattice.aligned
+                ? 0.0
+                : hs_axis_rounding(d) * (2.0 * ball->centre.terms[k] + HS_MAX_DIM * radius) +
+                      wrapping + list->axis[k].leak;
+        hs_axis_span(&list->axis[k], ball->centre.t[k], least + error, error, &ball->span[k]);
+        images *= (double)(ball->span[k].most - ball->span[k].least) + 1.0;
+        ball->home.centre[k] = ball->centre.x[k];
+        ball->home.image[k] = 0;
+    }
+    set_thresholds(ball, list->lattice.aligned ? 0.0 : d * ball->error, &ball->home);
+    return images <= MOST_BALL_IMAGES ? HS_OK : HS_ERR_SHIFT_RANGE;
 }
 
 /* By how many rows the position of an entry was wrapped. */
@@ -423,9 +415,9 @@ typedef struct part {
 HS_ALWAYS_INLINE double
 gap_of(const hs_ball *ball, int k, int64_t u)
 {
-    const hs_axis *axis = &ball->list->axes.axis[k];
+    const hs_axis *axis = &ball->list->axis[k];
     const double   t = ball->centre.t[k];
-    const int64_t  centre = ball->span[k].centre;
+    const int64_t  centre = ball->centre.index[k];
     if (!ball->list->lattice.aligned) {
         return 0.0;
     }
@@ -441,7 +433,7 @@ HS_ALWAYS_INLINE part
 part_of(const hs_ball *ball, int k, int64_t u)
 {
     const hs_dynamic *list = ball->list;
-    const hs_axis    *axis = &list->axes.axis[k];
+    const hs_axis    *axis = &list->axis[k];
     part              p = {.image = hs_axis_image(axis, u)};
     p.index = u - p.image * axis->n;
     p.gap = gap_of(ball, k, u);
@@ -462,7 +454,7 @@ is_met(const hs_ball *ball, uint32_t place)
     const double     *x = hs_entry_at(&list->entries, place);
     double            gap = 0.0;
     for (int k = 0; k < list->lattice.ndim; k++) {
-        const hs_axis          *axis = &list->axes.axis[k];
+        const hs_axis          *axis = &list->axis[k];
         const hs_span_of_cells *span = &ball->span[k];
         int64_t                 u = hs_axis_cell(axis, hs_lattice_coordinate(&list->lattice, x, k));
         u += axis->n * hs_axis_image(axis, span->first - u + axis->n - 1);
@@ -562,7 +554,7 @@ image_of(hs_ball *ball, const int64_t *along, const int ndim)
         return &ball->home;
     }
     for (k = 0; k < ndim; k++) {
-        const int r = ball->list->axes.axis[k].row;
+        const int r = ball->list->axis[k].row;
         if (r >= 0) {
             image[r] = along[k];
             same = same && ball->turned.image[r] == along[k];
@@ -702,7 +694,7 @@ walk_few(hs_ball *ball, int reach, const int ndim)
     do {
         const hs_span_of_cells *span = &ball->span[k];
         for (int o = -reach; o <= reach; o++) {
-            const int64_t u = span->centre + o;
+            const int64_t u = ball->centre.index[k] + o;
             if (u < span->first || u > span->last) {
                 parts[k][o + HS_MOST_REACH] = (part){.gap = INFINITY};
             } else {
@@ -795,9 +787,9 @@ walk_ball(hs_ball *ball, const hs_ball_visit *visit)
     if (visit->is_near) {
         bool is_wide = list->cells.is_wide;
         for (int k = 0; k < list->lattice.ndim; k++) {
-            const int64_t n = list->axes.axis[k].n;
+            const int64_t n = list->axis[k].n;
             if (n > 0 && span[k].last - span[k].first >= n) {
-                span[k].first = span[k].centre - n / 2; /* each cell once, around the centre's */
+                span[k].first = ball->centre.index[k] - n / 2; /* each once, around the centre's */
                 span[k].last = span[k].first + n - 1;
                 ball->cut |= 1u << k;
             }
@@ -810,7 +802,7 @@ walk_ball(hs_ball *ball, const hs_ball_visit *visit)
     }
     /* The cells that there are: those of an open dense table end where it does. */
     for (int k = 0; k < list->lattice.ndim; k++, span++) {
-        if (list->cells.dense && list->axes.axis[k].n == 0) {
+        if (list->cells.dense && list->axis[k].n == 0) {
             const int64_t first = list->cells.lowest[k], last = first + list->cells.shape[k] - 1;
             span->first = span->first < first ? first : span->first;
             span->last = span->last > last ? last : span->last;
@@ -818,7 +810,8 @@ walk_ball(hs_ball *ball, const hs_ball_visit *visit)
         if (list->cells.n == 0 || span->first > span->last) {
             return false;
         }
-        const int64_t below = span->centre - span->first, above = span->last - span->centre;
+        const int64_t centre = ball->centre.index[k];
+        const int64_t below = centre - span->first, above = span->last - centre;
         wanted *= (double)(span->last - span->first) + 1.0;
         stored *= ball->visit->is_near ? 1.0 : (double)(span->most - span->least) + 1.0;
         ball->meets_images = ball->meets_images || span->least != 0 || span->most != 0;

@@ -9,21 +9,18 @@
  * with a proven bound first, then the stages of metric.h on the positions that were given.
  */
 
-/* The grid axes of a lattice. cell_size: least width, where `one_cell` is false. max_radius: of
- * queries. */
-void hs_axes_init(hs_axes *axes, const hs_lattice *lattice, double cell_size, bool one_cell,
-                  double max_radius);
+/* The grid axes of a list, which has its lattice and largest radius. cell_size: least width, where
+ * `one_cell` is false. */
+void hs_axes_init(hs_dynamic *list, double cell_size, bool one_cell);
 
-/* Lists for balls up to this radius, as far as they are not too long. False when memory is
+/* Offsets for balls up to that radius, as far as they are not too many. False when memory is
  * refused. */
-bool hs_offsets_init(hs_offsets *offsets, const hs_axes *axes, const hs_lattice *lattice,
-                     double max_radius);
+bool hs_offsets_init(hs_dynamic *list);
 
 /* Cells that a ball meets along one axis. */
 typedef struct hs_span_of_cells {
     int64_t first, last; /* u of cells; last < first: none */
     int64_t least, most; /* images */
-    int64_t centre;      /* u of the centre's cell */
 } hs_span_of_cells;
 
 /* A double at most x - y, and one at least x + y. Where they are subnormal, the sum was exact. */
@@ -42,18 +39,16 @@ hs_above(double x, double y)
 }
 
 /* The cells of a ball that meets other images: less than 2^30 of them. low, high: its ends, rounded
- * outwards; error: what coordinates may be wrong by. Sets all but the centre. */
+ * outwards; error: what coordinates may be wrong by. */
 void hs_axis_images(const hs_axis *axis, double low, double high, double error,
                     hs_span_of_cells *span);
 
-/* The cells of a ball. t: its centre, in the middle period but for rounding, and in the cell
- * `centre`; radius: with the error. */
+/* The cells of a ball. t: its centre, in the middle period but for rounding; radius: with the
+ * error. */
 HS_ALWAYS_INLINE void
-hs_axis_span(const hs_axis *axis, double t, int64_t centre, double radius, double error,
-             hs_span_of_cells *span)
+hs_axis_span(const hs_axis *axis, double t, double radius, double error, hs_span_of_cells *span)
 {
     const double low = hs_below(t, radius), high = hs_above(t, radius);
-    span->centre = centre;
     if (axis->n == 0 || (low >= -axis->half + error && high <= axis->half - error)) {
         span->first = hs_axis_cell(axis, low);
         span->last = hs_axis_cell(axis, high);

@@ -130,19 +130,10 @@ hs_gate_release(hs_gate *gate)
 
 /* Positions made ready, for the number of dimensions that a list has. */
 
-hs_status
-hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
-                 hs_failure *failure)
-{
-    switch (list->lattice.ndim) {
-    case 2: return hs_dynamic_place_in(list, given, placed, failure, 2);
-    case 3: return hs_dynamic_place_in(list, given, placed, failure, 3);
-    default: return hs_dynamic_place_in(list, given, placed, failure, list->lattice.ndim);
-    }
-}
-
-bool
-hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
+/* In general boxes: whether X and its coordinates are known to within a few periods, so that a ball
+ * meets few images. Sets the magnitude and the terms. */
+static bool
+is_known(const hs_dynamic *list, hs_placed *placed)
 {
     const hs_lattice *lattice = &list->lattice;
     bool              known = true;
@@ -163,9 +154,49 @@ hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed)
     }
     for (int k = 0; k < lattice->ndim; k++) {
         placed->terms[k] = hs_axis_terms(lattice, placed->x, k);
-        known = known && placed->terms[k] < list->axes.axis[k].farthest;
+        known = known && placed->terms[k] < list->axis[k].farthest;
     }
     return known;
+}
+
+HS_ALWAYS_INLINE hs_status
+place_in(const hs_dynamic *list, const double *given, hs_placed *placed, hs_failure *failure,
+         const int ndim)
+{
+    placed->given = given;
+    placed->magnitude = 0.0;
+    for (int k = 0; k < ndim; k++) {
+        if (!isfinite(given[k])) {
+            failure->column = k;
+            failure->value = given[k];
+            return HS_ERR_NOT_FINITE;
+        }
+    }
+    if (HS_UNLIKELY(list->counters != NULL) && list->lattice.n_periodic > 0) {
+        list->counters->wraps++;
+    }
+    if (!hs_dynamic_wrap(list, given, placed->x, placed->turns, &placed->magnitude, ndim)) {
+        return HS_ERR_SHIFT_RANGE;
+    }
+    if (!list->lattice.aligned && !is_known(list, placed)) {
+        return HS_ERR_SHIFT_RANGE;
+    }
+    for (int k = 0; k < ndim; k++) {
+        placed->t[k] = hs_lattice_coordinate(&list->lattice, placed->x, k);
+        placed->index[k] = hs_axis_cell(&list->axis[k], placed->t[k]);
+    }
+    return HS_OK;
+}
+
+hs_status
+hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
+                 hs_failure *failure)
+{
+    switch (list->lattice.ndim) {
+    case 2: return place_in(list, given, placed, failure, 2);
+    case 3: return place_in(list, given, placed, failure, 3);
+    default: return place_in(list, given, placed, failure, list->lattice.ndim);
+    }
 }
 
 /* ---- lists as a whole ---- */
@@ -229,7 +260,7 @@ measure_box(hs_dynamic *list)
         }
     }
     for (int k = 0; k < list->lattice.ndim; k++) {
-        const hs_axis *axis = &list->axes.axis[k];
+        const hs_axis *axis = &list->axis[k];
         for (int l = 0; l < list->lattice.n_periodic; l++) {
             list->moves[k] = list->moves[k] || list->lattice.given[l][k] != 0.0;
         }
@@ -277,13 +308,11 @@ hs_dynamic_new(const hs_dynamic_options *options, hs_dynamic **list, hs_failure 
         status = hs_skew_is_left(&made->lattice) ? HS_ERR_BOX_SKEWED : HS_OK;
     }
     if (status == HS_OK) {
-        hs_axes_init(&made->axes, &made->lattice, options->cell_size,
-                     options->storage == HS_STORE_ALL_PAIRS, made->max_radius);
+        hs_axes_init(made, options->cell_size, options->storage == HS_STORE_ALL_PAIRS);
         hs_stored_init(made, options->storage != HS_STORE_HASH, options->grid_bytes);
         if (!(measure_box(made) <= MOST_IMAGES)) {
             status = refuse_length(failure, HS_LENGTH_MAX_RADIUS, made->max_radius);
-        } else if (!hs_offsets_init(&made->offsets, &made->axes, &made->lattice,
-                                    made->max_radius)) {
+        } else if (!hs_offsets_init(made)) {
             status = HS_ERR_MEMORY;
         }
     }

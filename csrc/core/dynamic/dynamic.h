@@ -127,11 +127,6 @@ typedef struct hs_axis {
     double  farthest; /* sum of absolute terms of coordinates that are too far away; as above */
 } hs_axis;
 
-typedef struct hs_axes {
-    int     ndim;
-    hs_axis axis[HS_MAX_DIM];
-} hs_axes;
-
 /*
  * Coordinates of X along the axes of general boxes are rounded sums of products with X, which is
  * rounded itself: by less than this of the sum of absolute products.
@@ -290,7 +285,7 @@ struct hs_dynamic {
     bool       moves[HS_MAX_DIM]; /* whether B does, along each coordinate axis */
     double     most_terms;        /* of wrapping: beyond, X errs by a period or so */
     double     magnitude; /* of wrapping, of all points that were ever here: at most most_terms */
-    hs_axes    axes;
+    hs_axis    axis[HS_MAX_DIM];
     hs_offsets offsets;
     hs_entries entries;
     hs_hash    map; /* from keys to places of entries */
@@ -328,7 +323,7 @@ hs_dynamic_wrap(const hs_dynamic *list, const double *given, double *wrapped, in
         return hs_wrap_point(&list->lattice, given, wrapped, turns, magnitude);
     }
     for (int k = 0; k < ndim; k++) {
-        const hs_axis *axis = &list->axes.axis[k];
+        const hs_axis *axis = &list->axis[k];
         const double   x = given[k], size = fabs(x);
         wrapped[k] = x;
         if (axis->row < 0) {
@@ -347,41 +342,7 @@ hs_dynamic_wrap(const hs_dynamic *list, const double *given, double *wrapped, in
     return fits;
 }
 
-/* In general boxes: whether X and its coordinates are known to within a few periods, so that a ball
- * meets few images. Sets the magnitude and the terms. */
-bool hs_dynamic_is_known(const hs_dynamic *list, hs_placed *placed);
-
-/* HS_OK, HS_ERR_NOT_FINITE with column and value, HS_ERR_SHIFT_RANGE. ndim: that of the list, for
- * callers that let the compiler unroll loops. */
-HS_ALWAYS_INLINE hs_status
-hs_dynamic_place_in(const hs_dynamic *list, const double *given, hs_placed *placed,
-                    hs_failure *failure, const int ndim)
-{
-    placed->given = given;
-    placed->magnitude = 0.0;
-    for (int k = 0; k < ndim; k++) {
-        if (!isfinite(given[k])) {
-            failure->column = k;
-            failure->value = given[k];
-            return HS_ERR_NOT_FINITE;
-        }
-    }
-    if (HS_UNLIKELY(list->counters != NULL) && list->lattice.n_periodic > 0) {
-        list->counters->wraps++;
-    }
-    if (!hs_dynamic_wrap(list, given, placed->x, placed->turns, &placed->magnitude, ndim)) {
-        return HS_ERR_SHIFT_RANGE;
-    }
-    if (!list->lattice.aligned && !hs_dynamic_is_known(list, placed)) {
-        return HS_ERR_SHIFT_RANGE;
-    }
-    for (int k = 0; k < ndim; k++) {
-        placed->t[k] = hs_lattice_coordinate(&list->lattice, placed->x, k);
-        placed->index[k] = hs_axis_cell(&list->axes.axis[k], placed->t[k]);
-    }
-    return HS_OK;
-}
-
+/* HS_OK, HS_ERR_NOT_FINITE with column and value, HS_ERR_SHIFT_RANGE. */
 hs_status hs_dynamic_place(const hs_dynamic *list, const double *given, hs_placed *placed,
                            hs_failure *failure);
 

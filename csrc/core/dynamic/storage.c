@@ -26,7 +26,7 @@ hs_stored_init(hs_dynamic *list, bool dense, double most_bytes)
     list->map = (hs_hash){0};
     list->cells = (hs_cell_table){.dense = dense, .ndim = ndim, .most_bytes = most_bytes};
     for (int k = 0; k < ndim; k++) {
-        list->cells.shape[k] = list->axes.axis[k].n; /* 0: none yet, along open axes */
+        list->cells.shape[k] = list->axis[k].n; /* 0: none yet, along open axes */
     }
     list->n_without = 0;
     list->magnitude = 0.0;
@@ -1032,7 +1032,7 @@ hs_dynamic_look(const hs_dynamic *list)
     state.changes = list->changes;
     state.max_radius = list->max_radius;
     for (int k = 0; k < state.ndim; k++) {
-        state.cell_size[k] = list->axes.axis[k].width;
+        state.cell_size[k] = list->axis[k].width;
     }
     hs_dynamic_leave(list, call);
     return state;

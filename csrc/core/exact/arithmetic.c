@@ -51,8 +51,8 @@ hs_dyadic_set_integer(int64_t x, hs_dyadic *to)
     set_scaled(x < 0 ? ~(uint64_t)x + 1 : (uint64_t)x, 0, x < 0, to);
 }
 
-void
-hs_dyadic_copy(const hs_dyadic *from, hs_dyadic *to)
+static void
+copy(const hs_dyadic *from, hs_dyadic *to)
 {
     to->negative = from->negative;
     to->n = from->n;
@@ -98,12 +98,6 @@ hs_dyadic_compare_sizes(const hs_dyadic *a, const hs_dyadic *b)
 }
 
 static void
-negate(hs_dyadic *x, bool if_this)
-{
-    x->negative = x->negative != if_this;
-}
-
-static void
 add_sizes(const hs_dyadic *a, const hs_dyadic *b, hs_dyadic *to)
 {
     const int32_t low = lower_place(a, b), n = upper_place(a, b) - low;
@@ -137,8 +131,8 @@ hs_dyadic_add(const hs_dyadic *a, const hs_dyadic *b, bool subtract, hs_dyadic *
     HS_ASSERT(to != a && to != b);
     if (a->n == 0 || b->n == 0) {
         const hs_dyadic *one = b->n == 0 ? a : b;
-        hs_dyadic_copy(one, to);
-        negate(to, subtract && one == b);
+        copy(one, to);
+        to->negative = one->negative != (subtract && one == b);
         return;
     }
     if (a->negative == (b->negative != subtract)) {
@@ -152,6 +146,14 @@ hs_dyadic_add(const hs_dyadic *a, const hs_dyadic *b, bool subtract, hs_dyadic *
         to->negative = b->negative != subtract;
     }
     trim(to);
+}
+
+void
+hs_dyadic_add_to(hs_dyadic *sum, const hs_dyadic *a)
+{
+    hs_dyadic before;
+    copy(sum, &before);
+    hs_dyadic_add(&before, a, false, sum);
 }
 
 void

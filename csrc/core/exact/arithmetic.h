@@ -165,6 +165,19 @@ hs_next_down(double x)
     return x;
 }
 
+/* Products of numbers >= 0, not below and not above the true ones. */
+HS_ALWAYS_INLINE double
+hs_multiply_up(double a, double b)
+{
+    return hs_next_up(a * b);
+}
+
+HS_ALWAYS_INLINE double
+hs_multiply_down(double a, double b)
+{
+    return hs_next_down(a * b);
+}
+
 /* The few operations on 64-bit limbs that long integers are made of. */
 
 #if defined(_MSC_VER)
@@ -262,10 +275,11 @@ typedef struct hs_dyadic {
 void hs_dyadic_set(double x, int exponent, hs_dyadic *to);
 void hs_dyadic_set_integer(int64_t x, hs_dyadic *to);
 
-void hs_dyadic_copy(const hs_dyadic *from, hs_dyadic *to);
-
 /* a + b, or a - b. `to` must be neither. */
 void hs_dyadic_add(const hs_dyadic *a, const hs_dyadic *b, bool subtract, hs_dyadic *to);
+
+/* sum += a. */
+void hs_dyadic_add_to(hs_dyadic *sum, const hs_dyadic *a);
 
 /* a b. `to` must be neither. */
 void hs_dyadic_multiply(const hs_dyadic *a, const hs_dyadic *b, hs_dyadic *to);

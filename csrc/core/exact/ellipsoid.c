@@ -30,29 +30,16 @@ typedef struct scaled_support {
     bool   is_exact;
 } scaled_support;
 
-static double
-largest_entry(int ndim, const double *entries)
+static void
+scale(int ndim, const double *entries, scaled_support *to)
 {
     double largest = 0.0;
     for (int e = 0; e < hs_support_entries(ndim); e++) {
         largest = hs_larger(largest, fabs(entries[e]));
     }
-    return largest;
-}
-
-/* Whether numbers of this size need no scaling. */
-static bool
-is_ordinary(double size)
-{
-    return size >= 1.0 / ORDINARY && size <= ORDINARY;
-}
-
-static void
-scale(int ndim, const double *entries, scaled_support *to)
-{
-    const double largest = largest_entry(ndim, entries);
     to->ndim = ndim;
-    to->exponent = largest > 0.0 && !is_ordinary(largest) ? ilogb(largest) : 0;
+    const bool is_ordinary = largest >= 1.0 / ORDINARY && largest <= ORDINARY;
+    to->exponent = largest > 0.0 && !is_ordinary ? ilogb(largest) : 0;
     to->is_exact = true;
     for (int e = 0; e < hs_support_entries(ndim); e++) {
         to->entries[e] = to->exponent == 0 ? entries[e] : ldexp(entries[e], -to->exponent);
@@ -63,25 +50,12 @@ scale(int ndim, const double *entries, scaled_support *to)
 
 /* ---- in float64 ---- */
 
-/* Not below and not above the product of numbers >= 0. */
-static double
-product_up(double a, double b)
-{
-    return hs_next_up(a * b);
-}
-
-static double
-product_down(double a, double b)
-{
-    return hs_next_down(a * b);
-}
-
 /* Whether two rows are surely positive definite, for lower bounds of the diagonal and an upper one
  * of the size of what is beside it. */
 static bool
 is_pair_definite(double first, double second, double beside)
 {
-    return product_down(first, second) > product_up(beside, beside);
+    return hs_multiply_down(first, second) > hs_multiply_up(beside, beside);
 }
 
 /* A number that is known between bounds >= 0. */
@@ -94,8 +68,8 @@ static size_range
 quotient_of(double a, double b, size_range p)
 {
     const double x = fabs(a), y = fabs(b);
-    return (size_range){hs_next_down(product_down(x, y) / p.high),
-                        hs_next_up(product_up(x, y) / p.low)};
+    return (size_range){hs_next_down(hs_multiply_down(x, y) / p.high),
+                        hs_next_up(hs_multiply_up(x, y) / p.low)};
 }
 
 /*
@@ -235,8 +209,7 @@ add_cofactor(exact_rows *rows, int a, int b, int c, int d, int e, hs_dyadic *sum
     hs_dyadic_multiply(&h[d], &h[e], &other);
     hs_dyadic_add(&one, &other, true, &rows->product);
     hs_dyadic_multiply(&h[a], &rows->product, &one);
-    hs_dyadic_add(sum, &one, false, &other);
-    hs_dyadic_copy(&other, sum);
+    hs_dyadic_add_to(sum, &one);
 }
 
 static int
@@ -324,18 +297,17 @@ hs_support_reach(int ndim, const double *entries, double extent, double *reach)
 double
 hs_support_size(int ndim, const double *entries)
 {
-    const double largest = largest_entry(ndim, entries);
-    const int    exponent = largest > 0.0 && !is_ordinary(largest) ? ilogb(largest) : 0;
-    double       sum = 0.0;
+    scaled_support h;
+    double         sum = 0.0;
+    scale(ndim, entries, &h);
     for (int k = 0; k < ndim; k++) {
         for (int l = 0; l < ndim; l++) {
-            const double entry = fabs(entries[hs_support_at(k, l)]);
-            const double scaled = exponent == 0 ? entry : ldexp(entry, -exponent);
-            sum = hs_next_up(sum + hs_next_up(scaled * scaled));
+            const double entry = h.entries[hs_support_at(k, l)];
+            sum = hs_next_up(sum + hs_multiply_up(entry, entry));
         }
     }
     const double root = hs_next_up(sqrt(sum));
-    return exponent == 0 ? root : hs_next_up(ldexp(root, exponent));
+    return h.exponent == 0 ? root : hs_next_up(ldexp(root, h.exponent));
 }
 
 /* A bound that holds for any solution, and is near for one that is about right. */
@@ -437,13 +409,6 @@ hs_support_span_of(const hs_metric *metric, const hs_span *span, hs_support_span
     }
 }
 
-/* Products of this size, of a support and D, neither overflow nor underflow, nor do squares. */
-static bool
-is_safe(double size)
-{
-    return size >= ldexp(1.0, -HS_SAFE_EXPONENT) && size <= ldexp(1.0, HS_SAFE_EXPONENT);
-}
-
 /* The entries in the unit of D. False where digits were lost. */
 HS_ALWAYS_INLINE bool
 scale_entries(const hs_support_metric *metric, const double *entries, double *to)
@@ -485,7 +450,7 @@ hs_support_decide_double(const hs_support_metric *metric, const double *entries,
     const int    ndim = metric->limit.ndim;
     const double scaled = size * metric->unscale;
     double       h[HS_SUPPORT_ENTRIES];
-    if (!of->usable || !metric->limit.floats_usable || !is_safe(scaled * of->size) ||
+    if (!of->usable || !metric->limit.floats_usable || !hs_is_safe(scaled * of->size) ||
         !scale_entries(metric, entries, h)) {
         return HS_UNDECIDED;
     }
@@ -509,19 +474,9 @@ find_difference(const hs_metric *measure, const hs_span *span, hs_dyadic *d)
             hs_dyadic_set_integer(span->shift[l], &one);
             hs_dyadic_set(measure->rows[l][k], 0, &other);
             hs_dyadic_multiply(&one, &other, &product);
-            hs_dyadic_copy(&d[k], &one);
-            hs_dyadic_add(&one, &product, false, &d[k]);
+            hs_dyadic_add_to(&d[k], &product);
         }
     }
-}
-
-/* a += b */
-static void
-add_to(hs_dyadic *a, const hs_dyadic *b)
-{
-    hs_dyadic sum;
-    hs_dyadic_add(a, b, false, &sum);
-    hs_dyadic_copy(&sum, a);
 }
 
 int
@@ -536,10 +491,10 @@ hs_support_compare(const hs_support_metric *metric, const double *entries, const
         for (int l = 0; l < measure->ndim; l++) {
             hs_dyadic_set(entries[hs_support_at(k, l)], 0, &entry);
             hs_dyadic_multiply(&entry, &d[l], &term);
-            add_to(&z, &term);
+            hs_dyadic_add_to(&z, &term);
         }
         hs_dyadic_multiply(&z, &z, &term);
-        add_to(&square, &term);
+        hs_dyadic_add_to(&square, &term);
     }
     hs_dyadic_set(metric->limit.cutoff, metric->exponent, &entry);
     hs_dyadic_multiply(&entry, &entry, &term);

@@ -8,30 +8,18 @@
 
 /* filter.c: the float32 thresholds, every step of their computation rounded to the safe side. */
 
-/* Sums and products of numbers >= 0, rounded up and down. */
+/* Sums of numbers >= 0, rounded up. */
 static double
 add_up(double a, double b)
 {
     return hs_next_up(a + b);
 }
 
-static double
-multiply_up(double a, double b)
-{
-    return hs_next_up(a * b);
-}
-
-static double
-multiply_down(double a, double b)
-{
-    return hs_next_down(a * b);
-}
-
 /* Roundings of y and of q, in units of their size. */
 static double
 input_rounding(double unit)
 {
-    return multiply_up(HS_FILTER_INPUT_ROUNDINGS + HS_FILTER_SLACK, unit);
+    return hs_multiply_up(HS_FILTER_INPUT_ROUNDINGS + HS_FILTER_SLACK, unit);
 }
 
 /* What else may be wrong with a component of y - q: what the caller knows of errors before y and q
@@ -39,7 +27,7 @@ input_rounding(double unit)
 static double
 other_error(double error, double tiny)
 {
-    return add_up(multiply_up(HS_FILTER_ERRORS, error), multiply_up(HS_FILTER_FLUSHES, tiny));
+    return add_up(hs_multiply_up(HS_FILTER_ERRORS, error), hs_multiply_up(HS_FILTER_FLUSHES, tiny));
 }
 
 /* How far the vector y - q that the kernel subtracts may be from D, Euclidean. */
@@ -47,8 +35,8 @@ static double
 input_error(int ndim, double extent, double error, double unit, double tiny)
 {
     const double component =
-        add_up(multiply_up(input_rounding(unit), extent), other_error(error, tiny));
-    return multiply_up(hs_next_up(sqrt((double)ndim)), component);
+        add_up(hs_multiply_up(input_rounding(unit), extent), other_error(error, tiny));
+    return hs_multiply_up(hs_next_up(sqrt((double)ndim)), component);
 }
 
 double
@@ -56,7 +44,7 @@ hs_reach_bound(double cutoff, double largest, double error, double unit, double 
 {
     const double rounding = input_rounding(unit);
     const double apart = add_up(cutoff, other_error(error, tiny));
-    const double sum = add_up(multiply_up(2.0, largest), apart);
+    const double sum = add_up(hs_multiply_up(2.0, largest), apart);
     return rounding < 0.5 ? hs_next_up(sum / hs_next_down(1.0 - rounding)) : HUGE_VAL;
 }
 
@@ -71,9 +59,9 @@ hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double
                     double *in, double *out)
 {
     const double a = input_error(ndim, extent, error, unit, tiny);
-    const double difference = multiply_up(HS_FILTER_DIFFERENCE_ROUNDINGS, unit);
-    const double roundings = multiply_up(HS_FILTER_SQUARE_ROUNDINGS * ndim, unit);
-    const double lost = multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny);
+    const double difference = hs_multiply_up(HS_FILTER_DIFFERENCE_ROUNDINGS, unit);
+    const double roundings = hs_multiply_up(HS_FILTER_SQUARE_ROUNDINGS * ndim, unit);
+    const double lost = hs_multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny);
     *in = -1.0;
     *out = HUGE_VAL;
     if (!(a <= DBL_MAX) || !(roundings < 0.5)) { /* not for infinity and NaN either */
@@ -83,16 +71,17 @@ hs_threshold_bounds(int ndim, double cutoff, double extent, double error, double
     /* n successive roundings change a number by at most the factor 1 +- gamma. */
     const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
 
-    const double far_root = multiply_up(hs_next_up(1.0 + difference), add_up(cutoff, a));
-    *out = add_up(multiply_up(multiply_up(far_root, far_root), hs_next_up(1.0 + gamma)), lost);
+    const double far_root = hs_multiply_up(hs_next_up(1.0 + difference), add_up(cutoff, a));
+    *out =
+        add_up(hs_multiply_up(hs_multiply_up(far_root, far_root), hs_next_up(1.0 + gamma)), lost);
 
     if (cutoff <= a) {
         return;
     }
     const double near_root =
-        multiply_down(hs_next_down(1.0 - difference), hs_next_down(cutoff - a));
+        hs_multiply_down(hs_next_down(1.0 - difference), hs_next_down(cutoff - a));
     const double near_square =
-        multiply_down(multiply_down(near_root, near_root), hs_next_down(1.0 - gamma));
+        hs_multiply_down(hs_multiply_down(near_root, near_root), hs_next_down(1.0 - gamma));
     if (near_square > lost) {
         *in = hs_next_down(near_square - lost);
     }
@@ -118,58 +107,59 @@ hs_limit_form_of(int ndim, double extent, double error)
 {
     const double unit = HS_FILTER_UNIT, tiny = HS_FILTER_TINY;
     const double a = input_error(ndim, extent, error, unit, tiny);
-    const double difference = multiply_up(HS_FILTER_DIFFERENCE_ROUNDINGS, unit);
-    const double roundings = multiply_up(HS_FILTER_SQUARE_ROUNDINGS * ndim, unit);
+    const double difference = hs_multiply_up(HS_FILTER_DIFFERENCE_ROUNDINGS, unit);
+    const double roundings = hs_multiply_up(HS_FILTER_SQUARE_ROUNDINGS * ndim, unit);
     const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
-    const double own = multiply_up(HS_FILTER_LIMIT_ROUNDINGS, unit);
+    const double own = hs_multiply_up(HS_FILTER_LIMIT_ROUNDINGS, unit);
     /* What is lost of the squares, and of both radii; (x + y)^2 is at least x^2 + y^2. */
     const double lost =
-        add_up(hs_next_up(sqrt(multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny))), 4.0 * tiny);
-    const double far = multiply_up(hs_next_up(1.0 + difference), hs_next_up(sqrt(1.0 + gamma)));
+        add_up(hs_next_up(sqrt(hs_multiply_up(HS_FILTER_SQUARE_FLUSHES * ndim, tiny))), 4.0 * tiny);
+    const double far = hs_multiply_up(hs_next_up(1.0 + difference), hs_next_up(sqrt(1.0 + gamma)));
     const double near =
-        multiply_down(hs_next_down(1.0 - difference), sqrt(1.0 - gamma) - unit * unit);
+        hs_multiply_down(hs_next_down(1.0 - difference), sqrt(1.0 - gamma) - unit * unit);
     const double more = hs_next_up(1.0 + own);
     if (!(a <= DBL_MAX)) { /* not for NaN either */
         return (hs_limit_form){1.0f, INFINITY, 1.0f, INFINITY};
     }
-    return (hs_limit_form){.in_factor = float_below(multiply_down(near, hs_next_down(1.0 - own))),
-                           .in_less = float_above(multiply_up(add_up(a, lost), more)),
-                           .out_factor = float_above(multiply_up(far, more)),
-                           .out_more =
-                               float_above(multiply_up(add_up(multiply_up(a, far), lost), more))};
+    return (hs_limit_form){
+        .in_factor = float_below(hs_multiply_down(near, hs_next_down(1.0 - own))),
+        .in_less = float_above(hs_multiply_up(add_up(a, lost), more)),
+        .out_factor = float_above(hs_multiply_up(far, more)),
+        .out_more = float_above(hs_multiply_up(add_up(hs_multiply_up(a, far), lost), more))};
 }
 
 double
 hs_support_roundings(int ndim, double unit)
 {
-    return multiply_up(HS_SUPPORT_FILTER_ROUNDINGS + HS_SUPPORT_FILTER_ROUNDINGS_PER_AXIS * ndim,
-                       unit);
+    return hs_multiply_up(HS_SUPPORT_FILTER_ROUNDINGS + HS_SUPPORT_FILTER_ROUNDINGS_PER_AXIS * ndim,
+                          unit);
 }
 
 hs_limit_form
 hs_support_form_of(int ndim, double extent, double error)
 {
     const double unit = HS_FILTER_UNIT, tiny = HS_FILTER_TINY, axes = ndim;
-    const double largest = multiply_up(hs_next_up(sqrt(axes)), extent); /* |y - q| */
+    const double largest = hs_multiply_up(hs_next_up(sqrt(axes)), extent); /* |y - q| */
     const double moved = add_up(input_error(ndim, extent, error, unit, tiny),
-                                multiply_up(hs_support_roundings(ndim, unit), largest));
-    const double roundings = multiply_up(HS_FILTER_SQUARE_ROUNDINGS * axes, unit);
+                                hs_multiply_up(hs_support_roundings(ndim, unit), largest));
+    const double roundings = hs_multiply_up(HS_FILTER_SQUARE_ROUNDINGS * axes, unit);
     const double gamma = hs_next_up(roundings / hs_next_down(1.0 - roundings));
-    const double own = multiply_up(HS_FILTER_LIMIT_ROUNDINGS, unit);
+    const double own = hs_multiply_up(HS_FILTER_LIMIT_ROUNDINGS, unit);
     const double more = hs_next_up(1.0 + own), less = hs_next_down(1.0 - own);
     /* Flushed to zero: entries, products and sums of each component, and then squares. */
-    const double flushed = multiply_up(multiply_up(axes * axes, tiny), add_up(extent, 2.0));
-    const double lost = hs_next_up(sqrt(multiply_up(HS_FILTER_SQUARE_FLUSHES * axes, tiny)));
+    const double flushed = hs_multiply_up(hs_multiply_up(axes * axes, tiny), add_up(extent, 2.0));
+    const double lost = hs_next_up(sqrt(hs_multiply_up(HS_FILTER_SQUARE_FLUSHES * axes, tiny)));
     const double far = hs_next_up(sqrt(1.0 + gamma)), near = sqrt(1.0 - gamma) - unit * unit;
     if (!(moved <= FLT_MAX) || !(flushed < 0.5)) { /* not for NaN either */
         return (hs_limit_form){1.0f, INFINITY, 1.0f, INFINITY};
     }
-    const double in = multiply_down(near, hs_next_down(1.0 - flushed)) - lost;
-    const double out = add_up(multiply_up(far, add_up(1.0, flushed)), lost);
-    return (hs_limit_form){.in_factor = -float_above(multiply_up(moved, more)),
-                           .in_less = -float_below(multiply_down(hs_next_down(in), less)),
-                           .out_factor = float_above(multiply_up(multiply_up(far, moved), more)),
-                           .out_more = float_above(multiply_up(out, more))};
+    const double in = hs_multiply_down(near, hs_next_down(1.0 - flushed)) - lost;
+    const double out = add_up(hs_multiply_up(far, add_up(1.0, flushed)), lost);
+    return (hs_limit_form){.in_factor = -float_above(hs_multiply_up(moved, more)),
+                           .in_less = -float_below(hs_multiply_down(hs_next_down(in), less)),
+                           .out_factor =
+                               float_above(hs_multiply_up(hs_multiply_up(far, moved), more)),
+                           .out_more = float_above(hs_multiply_up(out, more))};
 }
 
 hs_thresholds

@@ -189,26 +189,6 @@ compare_limbs(const uint64_t *a, const uint64_t *b, int n)
     return 0;
 }
 
-/* The square where everything fits 62 bits: single words instead of limbs. */
-static void
-square_small(const exact_sums *sums, uint64_t total[2])
-{
-    total[0] = total[1] = 0;
-    for (int k = 0; k < sums->n_axes; k++) {
-        int64_t value = 0;
-        for (int t = 0; t < sums->n_terms[k]; t++) {
-            const exact_term *term = &sums->terms[k][t];
-            const int64_t     size = (int64_t)(term->low << (term->exponent - sums->lowest));
-            value += term->negative ? -size : size;
-        }
-        const uint64_t size = (uint64_t)(value < 0 ? -value : value);
-        uint64_t       high = 0, carry = 0;
-        const uint64_t low = hs_multiply_add(size, size, 0, &high);
-        total[0] = hs_add_carry(total[0], low, &carry);
-        total[1] += high + carry;
-    }
-}
-
 /* The square in 2 n limbs; value has n. */
 HS_ALWAYS_INLINE void
 square_sums(const exact_sums *sums, int n, uint64_t *total, uint64_t *value)
@@ -257,14 +237,9 @@ compare_sums(exact_sums *one, exact_sums *other)
     if (n > 2) {
         return compare_large(one, other, n);
     }
-    if (n == 1) {
-        square_small(one, first);
-        square_small(other, second);
-    } else {
-        square_sums(one, 2, first, value);
-        square_sums(other, 2, second, value);
-    }
-    return compare_limbs(first, second, 2 * n);
+    square_sums(one, 2, first, value);
+    square_sums(other, 2, second, value);
+    return compare_limbs(first, second, 4);
 }
 
 int
@@ -337,26 +312,6 @@ hs_integer_difference(const hs_metric *metric, const double *p, const double *q,
 
 /* Whether a pair is within the cutoff, by the cheapest stage that can tell. */
 
-/* Whether the float stages may use this number: squares of it neither overflow nor underflow. */
-static bool
-is_safe(double x)
-{
-    return fabs(x) >= ldexp(1.0, -HS_SAFE_EXPONENT) && fabs(x) <= ldexp(1.0, HS_SAFE_EXPONENT);
-}
-
-/* The double next to x.hi + x.lo on the given side, or itself. */
-static double
-round_down(hs_dw x)
-{
-    return x.lo < 0.0 ? hs_next_down(x.hi) : x.hi;
-}
-
-static double
-round_up(hs_dw x)
-{
-    return x.lo > 0.0 ? hs_next_up(x.hi) : x.hi;
-}
-
 void
 hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_MAX_DIM],
                double cutoff, bool inclusive)
@@ -367,11 +322,11 @@ hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_M
     metric->n_rows = n_rows;
     metric->inclusive = inclusive;
     metric->cutoff = cutoff;
-    metric->floats_usable = is_safe(cutoff);
+    metric->floats_usable = hs_is_safe(cutoff);
     for (int l = 0; l < n_rows; l++) {
         for (int k = 0; k < ndim; k++) {
             metric->rows[l][k] = rows[l][k];
-            if (rows[l][k] != 0.0 && !is_safe(rows[l][k])) {
+            if (rows[l][k] != 0.0 && !hs_is_safe(fabs(rows[l][k]))) {
                 metric->floats_usable = false;
             }
         }
@@ -384,10 +339,13 @@ hs_metric_init(hs_metric *metric, int ndim, int n_rows, const double rows[][HS_M
     const hs_dw  square = hs_two_square(cutoff);
     const double roundings = HS_FLOAT64_ROUNDINGS + HS_FLOAT64_ROUNDINGS_PER_AXIS * ndim;
     const hs_dw  width = hs_two_product(roundings * HS_FLOAT64_UNIT, square.hi);
+    const hs_dw  in = hs_dw_add(square, (hs_dw){-width.hi, -width.lo});
+    const hs_dw  out = hs_dw_add(square, width);
     metric->square_hi = square.hi;
     metric->square_lo = square.lo;
-    metric->sure_in = round_down(hs_dw_add(square, (hs_dw){-width.hi, -width.lo}));
-    metric->sure_out = round_up(hs_dw_add(square, width));
+    /* The double itself, or the next one on the safe side. */
+    metric->sure_in = in.lo < 0.0 ? hs_next_down(in.hi) : in.hi;
+    metric->sure_out = out.lo > 0.0 ? hs_next_up(out.hi) : out.hi;
 }
 
 /* The float stages, for a constant ndim where the compiler can be given one. */

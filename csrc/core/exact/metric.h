@@ -107,6 +107,14 @@ int hs_metric_compare(const hs_metric *metric, const hs_span *one, const hs_span
 
 #define HS_SAFE_EXPONENT (1024 - HS_RANGE_GUARD)
 
+/* Whether the float stages may use numbers of this size: squares of it neither overflow nor
+ * underflow. */
+HS_ALWAYS_INLINE bool
+hs_is_safe(double size)
+{
+    return size >= ldexp(1.0, -HS_SAFE_EXPONENT) && size <= ldexp(1.0, HS_SAFE_EXPONENT);
+}
+
 typedef enum hs_verdict { HS_UNDECIDED, HS_WITHIN, HS_BEYOND } hs_verdict;
 
 /* D as computed; |computed D - D| <= error, Euclidean. */

@@ -1,10 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "histogram.h"
 #include "../collect/parallel.h"
-#include "../exact/arithmetic.h"
-#include "../exact/filter.h"
-#include "../memory/memory.h"
-#include "../search/scan.h"
 
 #include <float.h>
 #include <math.h>
@@ -21,17 +17,6 @@
  * A slot is 2 k for "k edges are reached, surely", and odd for pairs that must be decided exactly.
  */
 
-/* The edges of a histogram; shared by all threads. */
-typedef struct histogram_edges {
-    int64_t n;
-    bool    inclusive, last_inclusive; /* edges, the last edge, belong to the bin below */
-    double *at;                        /* owned; as the scene's metric takes them; n */
-    double *lower;                     /* at most, ... */
-    double *upper; /* ... and at least the scaled edge; both in the memory of `at` */
-    int     ndim;
-    double  filter_error; /* of the search: bound on each component before rounding to float32 */
-} histogram_edges;
-
 /* Squares of one cell of the table: with s < in `slot`, with s > out two more, else one more. in
  * and out are the bits of floats, which order like these. */
 typedef struct edge_cell {
@@ -43,6 +28,7 @@ typedef struct edge_cell {
 /* The table for neighbourhoods up to some extent; belongs to one thread. */
 typedef struct edge_table {
     double     extent; /* 0 when there is no table yet */
+    int64_t    n;      /* edges */
     float     *in;     /* owned, n: the band of each edge; ascending */
     float     *out;    /* in the memory of `in` */
     edge_cell *cells;  /* owned; NULL where squares may overflow: then nothing is sure */
@@ -50,13 +36,6 @@ typedef struct edge_table {
     int32_t    first;  /* leading bits of the squares of cell 0 */
     int32_t    last;   /* number of the last cell */
 } edge_table;
-
-/* Whether a pair at exactly edge k is below it. */
-HS_ALWAYS_INLINE bool
-is_inclusive(const histogram_edges *edges, int64_t k)
-{
-    return k == edges->n - 1 ? edges->last_inclusive : edges->inclusive;
-}
 
 /* Bits of a float32 that do not choose its cell, in the order in which they are tried. For each
  * power of two there are 128 cells, which tell a hundred bins apart, or 2048 for a thousand, or
@@ -66,50 +45,29 @@ is_inclusive(const histogram_edges *edges, int64_t k)
 #define ALL_CELLS  8
 #define MOST_CELLS (1 << 16) /* a megabyte; squares below these share cell 0 */
 
-/* Edges of the histogram in the unit of the scene. */
-static hs_status
-edges_init(hs_account *account, const hs_scene *scene, double filter_error,
-           const hs_histogram *histogram, histogram_edges *edges)
+/* Edges and the bands around them. */
+static void
+set_bands(const hs_search *search, const hs_histogram *histogram, double extent, edge_table *table)
 {
-    const int64_t n = histogram->n_edges;
-    *edges = (histogram_edges){.n = n,
-                               .inclusive = histogram->inclusive,
-                               .last_inclusive = histogram->last_inclusive,
-                               .ndim = scene->ndim,
-                               .filter_error = filter_error};
-    edges->at = hs_alloc(account, HS_FOR_CANDIDATES, 3 * n, sizeof(double));
-    if (edges->at == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    edges->lower = edges->at + n;
-    edges->upper = edges->lower + n;
-    for (int64_t k = 0; k < n; k++) {
+    const hs_scene *scene = &search->scene;
+    for (int64_t k = 0; k < histogram->n_edges; k++) {
         const double given = histogram->edges[k], scaled = hs_scale_apply(scene->scale, given);
         /* Scaling may have rounded or flushed it. */
         const double loss = scene->extreme && given > 0.0 ? HS_SCALING_LOSS : 0.0;
-        edges->at[k] = scene->extreme ? given : scaled;
-        edges->lower[k] = scaled - loss;
-        edges->upper[k] = scaled + loss;
-    }
-    return HS_OK;
-}
-
-static void
-set_bands(const histogram_edges *edges, double extent, edge_table *table)
-{
-    for (int64_t k = 0; k < edges->n; k++) {
-        const double lower = edges->lower[k], upper = edges->upper[k];
-        if (edges->at[k] == 0.0 && !is_inclusive(edges, k)) {
+        const double lower = scaled - loss, upper = scaled + loss;
+        const bool   is_last = k == histogram->n_edges - 1;
+        if (search->shells.at[k] == 0.0 &&
+            !(is_last ? histogram->last_inclusive : histogram->inclusive)) {
             table->in[k] = table->out[k] = -1.0f; /* no distance is below zero */
             continue;
         }
         const hs_thresholds near =
-            hs_thresholds_of(edges->ndim, upper, extent, edges->filter_error);
+            hs_thresholds_of(scene->ndim, upper, extent, search->filter_error);
         table->out[k] = near.out;
         table->in[k] = near.in;
         if (lower != upper) {
             table->in[k] =
-                lower > 0.0 ? hs_thresholds_of(edges->ndim, lower, extent, edges->filter_error).in
+                lower > 0.0 ? hs_thresholds_of(scene->ndim, lower, extent, search->filter_error).in
                             : -1.0f;
         }
     }
@@ -127,14 +85,14 @@ cell_of(const edge_table *table, float square)
 /* Makes cells of 2^shift neighbouring floats each, from the first band that ends above zero to the
  * last. Returns how many pairs of bands share a cell although they do not overlap. */
 static int64_t
-set_cells(const histogram_edges *edges, int shift, edge_table *table)
+set_cells(int shift, edge_table *table)
 {
     int64_t k = 0, shared = 0;
-    while (k < edges->n - 1 && table->out[k] < 0.0f) {
+    while (k < table->n - 1 && table->out[k] < 0.0f) {
         k++;
     }
     const float lowest = table->out[k] < 0.0f ? 0.0f : table->out[k];
-    const float highest = table->out[edges->n - 1] < 0.0f ? 0.0f : table->out[edges->n - 1];
+    const float highest = table->out[table->n - 1] < 0.0f ? 0.0f : table->out[table->n - 1];
     table->shift = shift;
     table->first = (int32_t)(hs_bits_of_float(lowest) >> shift);
     table->last = (int32_t)(hs_bits_of_float(highest) >> shift) - table->first;
@@ -142,7 +100,7 @@ set_cells(const histogram_edges *edges, int shift, edge_table *table)
         table->first += table->last - (MOST_CELLS - 1);
         table->last = MOST_CELLS - 1;
     }
-    for (; k + 1 < edges->n; k++) {
+    for (; k + 1 < table->n; k++) {
         const float in = table->in[k + 1], out = table->out[k];
         shared += in > out && cell_of(table, in) == cell_of(table, out);
     }
@@ -150,17 +108,17 @@ set_cells(const histogram_edges *edges, int shift, edge_table *table)
 }
 
 static void
-fill_cells(const histogram_edges *edges, edge_table *table)
+fill_cells(edge_table *table)
 {
     int64_t below = 0, reached = 0; /* bands that end before the cell, or begin before its end */
     for (int32_t c = 0; c <= table->last; c++) {
         const uint32_t at = (uint32_t)(table->first + c);
         const float    least = c == 0 ? 0.0f : hs_float_of_bits(at << table->shift);
         const float    most = hs_float_of_bits(((at + 1) << table->shift) - 1);
-        while (below < edges->n && table->out[below] < least) {
+        while (below < table->n && table->out[below] < least) {
             below++;
         }
-        while (reached < edges->n && (c == table->last || table->in[reached] <= most)) {
+        while (reached < table->n && (c == table->last || table->in[reached] <= most)) {
             reached++;
         }
         edge_cell *cell = &table->cells[c];
@@ -187,28 +145,31 @@ free_table(edge_table *table)
  * threads as they go, so no account is charged for its memory: at most 8 bytes an edge, and a
  * megabyte. */
 static hs_status
-build_table(const histogram_edges *edges, double extent, edge_table *table)
+build_table(const hs_search *search, const hs_histogram *histogram, double extent,
+            edge_table *table)
 {
+    const int64_t n = histogram->n_edges, few = n / 64; /* bins that may share a cell */
     free_table(table);
-    table->in = hs_alloc(NULL, HS_FOR_CANDIDATES, 2 * edges->n, sizeof(float));
+    table->in = hs_alloc(NULL, HS_FOR_CANDIDATES, 2 * n, sizeof(float));
     if (table->in == NULL) {
         return HS_ERR_MEMORY;
     }
-    table->out = table->in + edges->n;
-    set_bands(edges, extent, table);
-    if (!(4.0 * edges->ndim * extent * extent <= FLT_MAX)) { /* four times the largest square */
-        table->extent = extent;
+    table->n = n;
+    table->out = table->in + n;
+    set_bands(search, histogram, extent, table);
+    if (!(4.0 * search->scene.ndim * extent * extent <= FLT_MAX)) {
+        table->extent = extent; /* four times the largest square overflows */
         return HS_OK;
     }
-    const int64_t few = edges->n / 64; /* the last bins share first, and have the most pairs */
-    if (set_cells(edges, FEW_CELLS, table) > few && set_cells(edges, MANY_CELLS, table) > few) {
-        (void)set_cells(edges, ALL_CELLS, table); /* as few cells as keep most bands apart */
+    /* The last bins share first, and have the most pairs. */
+    if (set_cells(FEW_CELLS, table) > few && set_cells(MANY_CELLS, table) > few) {
+        (void)set_cells(ALL_CELLS, table); /* as few cells as keep most bands apart */
     }
     table->cells = hs_alloc(NULL, HS_FOR_CANDIDATES, (int64_t)table->last + 1, sizeof(edge_cell));
     if (table->cells == NULL) {
         return HS_ERR_MEMORY;
     }
-    fill_cells(edges, table);
+    fill_cells(table);
     table->extent = extent;
     return HS_OK;
 }
@@ -251,23 +212,6 @@ first_not_below(const float *limits, int32_t low, int32_t high, float square)
         }
     }
     return low;
-}
-
-/* For a square whose slot is odd: at least *low edges are reached, and at most *high. */
-static void
-find_range_of_edges(const edge_table *table, const histogram_edges *edges, float square,
-                    int32_t *low, int32_t *high)
-{
-    if (table->cells == NULL) {
-        *low = 0;
-        *high = (int32_t)edges->n;
-        return;
-    }
-    const edge_cell *cell = &table->cells[cell_of(table, square)];
-    const int32_t    first = cell->slot / 2, end = first + cell->n_bands;
-    *low = first_not_below(table->out, first, end, square);
-    /* Edges with in <= s: up to the first with in > s. */
-    *high = first_not_below(table->in, *low, end, nextafterf(square, INFINITY));
 }
 
 /*
@@ -362,25 +306,6 @@ init_weights(hs_account *account, const double *weights, const int32_t *order, i
             taken->place[i] = place;
         }
     }
-    return HS_OK;
-}
-
-/* Zeros, for products of these two. As many counts have been allocated: no product overflows. */
-static hs_status
-init_sums(hs_account *account, int64_t n, const point_weights *a, const point_weights *b,
-          exact_sums *sums)
-{
-    const int most_place = a->most_place + b->most_place;
-    const int for_bits = (a->bits + b->bits + most_place + SUM_BITS) / 32 + 1;
-    const int for_place = most_place / 32 + 5; /* what add_product writes to */
-    *sums = (exact_sums){.n = n,
-                         .n_limbs = for_bits > for_place ? for_bits : for_place,
-                         .exponent = a->exponent + b->exponent};
-    sums->limbs = hs_alloc(account, HS_FOR_CANDIDATES, n * sums->n_limbs, sizeof(int64_t));
-    if (sums->limbs == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    memset(sums->limbs, 0, (size_t)(n * sums->n_limbs) * sizeof(int64_t));
     return HS_OK;
 }
 
@@ -486,8 +411,7 @@ round_sum(const exact_sums *sums, int64_t k)
 
 /*
  * What one thread counts for a histogram. Hits come with their float32 squares; a table says which
- * slot each belongs to. Those that it cannot tell wait for the edge that halves their range, and
- * are decided exactly in batches.
+ * slot each belongs to. Those that it cannot tell are decided exactly in batches.
  */
 
 /* Types and weights of one set of points, in cell order. */
@@ -496,47 +420,35 @@ typedef struct marked_set {
     point_weights weights;
 } marked_set;
 
-#define TALLY_TABLES 4    /* extents that a walk may meet again; each a power of two */
-#define TALLY_COPIES 4    /* of small histograms: counting does not wait for the last count */
-#define TALLY_OPEN   1024 /* pairs that are decided together, at most */
-
-/* A pair that is decided edge by edge: it reaches at least `low` edges and at most `high`. */
-typedef struct open_pair {
-    int32_t si, place;
-    int32_t low, high;
-    int32_t next; /* of those that wait for the same edge, or -1 */
-} open_pair;
+#define TALLY_TABLES 4 /* extents that a walk may meet again; each a power of two */
+#define TALLY_COPIES 4 /* of small histograms: counting does not wait for the last count */
 
 typedef struct thread_tally {
     const struct tally_plan *plan;                 /* borrowed */
     edge_table               tables[TALLY_TABLES]; /* owned; place: exponent of the extent */
     int64_t                  n_slots;              /* of one group */
     int                      n_copies;
-    int64_t                 *counts;  /* owned; n_copies * n_groups * n_slots */
-    exact_sums               sums;    /* owned; n_groups * (edges + 1) */
-    void                    *arrays;  /* owned; in it: */
-    int32_t                 *slots;   /* of the hits of a visit */
-    int32_t                 *type;    /* of each candidate of the block; or NULL */
-    int64_t                 *value;   /* of each candidate: its weight; or NULL */
-    int32_t                 *place;   /* of each candidate: the place of its weight; or NULL */
-    open_pair               *open;    /* TALLY_OPEN */
-    int32_t                 *waiting; /* for each edge the first open pair, or -1 */
-    int32_t                 *asked;   /* edges that pairs wait for, TALLY_OPEN */
-    int32_t                  n_open, n_asked;
-    int64_t                  block; /* number of the block that types and weights are of */
+    int64_t                 *counts; /* owned; n_copies * n_groups * n_slots */
+    exact_sums               sums;   /* owned; n_groups * (edges + 1) */
+    void                    *arrays; /* owned; in it: */
+    int32_t                 *slots;  /* of the hits of a visit */
+    int32_t                 *type;   /* of each candidate of the block; or NULL */
+    int64_t                 *value;  /* of each candidate: its weight; or NULL */
+    int32_t                 *place;  /* of each candidate: the place of its weight; or NULL */
+    int64_t                  block;  /* number of the block that types and weights are of */
 } thread_tally;
 
 /* What all threads count by, only read while they do. */
 typedef struct tally_plan {
-    hs_search        *search;          /* borrowed */
-    histogram_edges   edges;           /* owned */
-    marked_set        points, queries; /* owned */
-    const marked_set *asking;          /* one of these two */
-    bool              has_types, sums; /* whether types matter; whether weights are summed */
-    int32_t           n_types;
-    int64_t           n_groups; /* pairs of types that are told apart */
-    int32_t          *group;    /* owned; n_types * n_types; when has_types */
-    thread_tally      all;      /* owned: of the threads that have ended; its plan is NULL before */
+    hs_search          *search; /* borrowed, as is the next; its shells are the edges */
+    const hs_histogram *histogram;
+    marked_set          points, queries; /* owned */
+    const marked_set   *asking;          /* one of these two */
+    bool                has_types, sums; /* whether types matter; whether weights are summed */
+    int32_t             n_types;
+    int64_t             n_groups; /* pairs of types that are told apart */
+    int32_t            *group;    /* owned; n_types * n_types; when has_types */
+    thread_tally        all; /* owned: of the threads that have ended; its plan is NULL before */
 } tally_plan;
 
 /* Point i of the set has the caller's number order[i]. HS_ERR_TYPES or HS_ERR_WEIGHTS set
@@ -575,8 +487,9 @@ static hs_status
 open_tally(void *context, void *state, const hs_walker *walker)
 {
     const tally_plan *plan = context;
+    const int64_t     n = plan->histogram->n_edges;
     thread_tally     *tally = state;
-    *tally = (thread_tally){.plan = plan, .n_slots = 2 * plan->edges.n + 1, .block = -1};
+    *tally = (thread_tally){.plan = plan, .n_slots = 2 * n + 1, .block = -1};
     tally->n_copies = !plan->has_types && tally->n_slots <= FEW_SLOTS ? TALLY_COPIES : 1;
     const hs_block *block = &walker->scanner.block;
     hs_account     *account = &plan->search->call->account;
@@ -584,9 +497,6 @@ open_tally(void *context, void *state, const hs_walker *walker)
     hs_parts        parts;
     hs_parts_begin(&parts);
     hs_parts_add(&parts, (void **)&tally->slots, block->most_hits, sizeof(int32_t));
-    hs_parts_add(&parts, (void **)&tally->open, TALLY_OPEN, sizeof(open_pair));
-    hs_parts_add(&parts, (void **)&tally->asked, TALLY_OPEN, sizeof(int32_t));
-    hs_parts_add(&parts, (void **)&tally->waiting, plan->edges.n, sizeof(int32_t));
     if (plan->has_types) {
         hs_parts_add(&parts, (void **)&tally->type, block->capacity, sizeof(int32_t));
     }
@@ -596,16 +506,27 @@ open_tally(void *context, void *state, const hs_walker *walker)
     }
     tally->counts = hs_alloc(account, HS_FOR_CANDIDATES, n_counts, sizeof(int64_t));
     tally->arrays = hs_parts_alloc(account, HS_FOR_CANDIDATES, &parts);
-    if (tally->counts == NULL || tally->arrays == NULL ||
-        (plan->sums &&
-         init_sums(account, plan->n_groups * (plan->edges.n + 1), &plan->asking->weights,
-                   &plan->points.weights, &tally->sums) != HS_OK)) {
+    if (tally->counts == NULL || tally->arrays == NULL) {
         return HS_ERR_MEMORY;
     }
     memset(tally->counts, 0, (size_t)n_counts * sizeof(int64_t));
-    for (int64_t k = 0; k < plan->edges.n; k++) {
-        tally->waiting[k] = -1;
+    if (!plan->sums) {
+        return HS_OK;
     }
+    /* Zeros, for products of two weights; as many counts have been allocated: nothing overflows. */
+    const point_weights *a = &plan->asking->weights, *b = &plan->points.weights;
+    exact_sums          *sums = &tally->sums;
+    const int            most_place = a->most_place + b->most_place;
+    const int            for_bits = (a->bits + b->bits + most_place + SUM_BITS) / 32 + 1;
+    const int            for_place = most_place / 32 + 5; /* what add_product writes to */
+    sums->n = plan->n_groups * (n + 1);
+    sums->n_limbs = for_bits > for_place ? for_bits : for_place;
+    sums->exponent = a->exponent + b->exponent;
+    sums->limbs = hs_alloc(account, HS_FOR_CANDIDATES, sums->n * sums->n_limbs, sizeof(int64_t));
+    if (sums->limbs == NULL) {
+        return HS_ERR_MEMORY;
+    }
+    memset(sums->limbs, 0, (size_t)(sums->n * sums->n_limbs) * sizeof(int64_t));
     return HS_OK;
 }
 
@@ -645,23 +566,6 @@ close_tally(void *context, void *state)
     free_tally(&plan->search->call->account, tally);
 }
 
-/* The table for groups up to this extent, rounded up to a power of two so that there are few. */
-static const edge_table *
-table_for(thread_tally *tally, double extent)
-{
-    int exponent = 0;
-    if (!(extent > 0.0) || !isfinite(extent)) { /* NaN, with which nothing is sure, or one point */
-        extent = extent == 0.0 ? 0x1p-1000 : INFINITY;
-    } else if (frexp(extent, &exponent) > 0.5) {
-        extent = ldexp(1.0, exponent);
-    }
-    edge_table *table = &tally->tables[(unsigned)exponent % TALLY_TABLES];
-    if (table->extent != extent && build_table(&tally->plan->edges, extent, table) != HS_OK) {
-        return NULL;
-    }
-    return table;
-}
-
 /* The group of pairs of point si and this candidate, by their types. */
 static int64_t
 group_of(const thread_tally *tally, int32_t si, int32_t place)
@@ -684,7 +588,7 @@ weight_of(const thread_tally *tally, int32_t si, int32_t *place)
 static int64_t *
 limbs_of(const thread_tally *tally, int64_t group, int32_t n_reached)
 {
-    const int64_t n_bins = tally->plan->edges.n + 1;
+    const int64_t n_bins = tally->plan->histogram->n_edges + 1;
     return tally->sums.limbs + (group * n_bins + n_reached) * tally->sums.n_limbs;
 }
 
@@ -730,20 +634,10 @@ sum_hits(thread_tally *tally, int32_t si, const int32_t *places, int32_t begin, 
     }
 }
 
-/* An open pair whose range is empty is decided; others wait for the edge in the middle. */
+/* Counts a pair that is beyond `low` edges and no more. */
 static void
-count_or_wait(thread_tally *tally, int32_t u)
+count_pair(thread_tally *tally, const hs_edge_pair *pair)
 {
-    open_pair *pair = &tally->open[u];
-    if (pair->low < pair->high) {
-        const int32_t edge = pair->low + (pair->high - pair->low) / 2;
-        if (tally->waiting[edge] < 0) {
-            tally->asked[tally->n_asked++] = edge;
-        }
-        pair->next = tally->waiting[edge];
-        tally->waiting[edge] = u;
-        return;
-    }
     const int64_t group = group_of(tally, pair->si, pair->place);
     if (tally->plan->sums) {
         int32_t       place;
@@ -755,84 +649,47 @@ count_or_wait(thread_tally *tally, int32_t u)
     tally->counts[group * tally->n_slots + 2 * pair->low]++;
 }
 
-static hs_status
-decide_edge(thread_tally *tally, hs_scanner *scanner, int32_t edge)
-{
-    const hs_metric       *given = &scanner->search->scene.metric;
-    const histogram_edges *edges = &tally->plan->edges;
-    hs_pair_batch         *pair_batch = &scanner->pair_batch;
-    hs_metric              metric;
-    uint8_t                within[HS_BATCH];
-    int32_t                u = tally->waiting[edge], end;
-    tally->waiting[edge] = -1;
-    hs_metric_init(&metric, given->ndim, given->n_rows, (const double(*)[HS_MAX_DIM])given->rows,
-                   edges->at[edge], is_inclusive(edges, edge));
-    while (u >= 0) {
-        hs_pair_batch_clear(pair_batch);
-        for (end = u; end >= 0 && pair_batch->n < HS_BATCH; end = tally->open[end].next) {
-            hs_pair_batch_put(pair_batch, tally->open[end].si, tally->open[end].place);
-        }
-        const hs_status status = hs_pair_batch_look_up(pair_batch, true, &scanner->failed_point);
-        if (status != HS_OK) {
-            return status;
-        }
-        hs_decide_pair_batch(scanner, &metric, within);
-        for (int32_t e = 0; u != end; e++) {
-            open_pair    *pair = &tally->open[u];
-            const int32_t next = pair->next;
-            if (within[e]) {
-                pair->high = edge;
-            } else {
-                pair->low = edge + 1;
-            }
-            count_or_wait(tally, u);
-            u = next;
-        }
-    }
-    return HS_OK;
-}
-
-static hs_status
-decide_open(thread_tally *tally, hs_scanner *scanner)
-{
-    hs_status status = HS_OK;
-    scanner->n_ambiguous += tally->n_open;
-    for (int32_t u = 0; u < tally->n_open; u++) {
-        count_or_wait(tally, u);
-    }
-    while (status == HS_OK && tally->n_asked > 0) {
-        status = decide_edge(tally, scanner, tally->asked[--tally->n_asked]);
-    }
-    tally->n_open = 0;
-    return status;
-}
-
 /* Looks again at hits with odd slots. */
 static hs_status
 look_again(thread_tally *tally, hs_scanner *scanner, const edge_table *table, int32_t first,
            const hs_hits *hits)
 {
-    hs_status status = HS_OK;
-    for (int32_t t = 0, h = 0; t < hits->n; t++) {
-        for (; h < hits->end[t]; h++) {
-            if (!(tally->slots[h] & 1)) {
-                continue;
+    const int32_t n = hits->end[hits->n - 1];
+    hs_edge_pairs open; /* large: not cleared */
+    hs_status     status = HS_OK;
+    open.n = 0;
+    for (int32_t h = 0, t = 0; h < n && status == HS_OK; h++) {
+        while (hits->end[t] <= h) {
+            t++;
+        }
+        if (tally->slots[h] & 1) {
+            hs_edge_pair *pair = &open.pair[open.n];
+            *pair =
+                (hs_edge_pair){.si = first + t, .place = hits->label[h], .high = (int32_t)table->n};
+            if (table->cells != NULL) {
+                const float      square = scanner->block.squares[h];
+                const edge_cell *cell = &table->cells[cell_of(table, square)];
+                const int32_t    end = cell->slot / 2 + cell->n_bands;
+                const float      next = hs_float_of_bits(hs_bits_of_float(square) + 1);
+                pair->low = first_not_below(table->out, cell->slot / 2, end, square);
+                /* Edges with in <= s: up to the first that is not below the next float. */
+                pair->high = first_not_below(table->in, pair->low, end, next);
             }
-            open_pair *pair = &tally->open[tally->n_open];
-            *pair = (open_pair){.si = first + t, .place = hits->label[h]};
-            find_range_of_edges(table, &tally->plan->edges, scanner->block.squares[h], &pair->low,
-                                &pair->high);
             if (pair->low == pair->high) { /* of a cell with several bands, but in none of these */
-                count_or_wait(tally, tally->n_open);
-            } else if (++tally->n_open == TALLY_OPEN) {
-                status = decide_open(tally, scanner);
-            }
-            if (status != HS_OK) {
-                return status;
+                count_pair(tally, pair);
+            } else {
+                open.n++;
             }
         }
+        if (open.n == HS_EDGE_PAIRS || h == n - 1) {
+            status = hs_decide_edges(scanner, &open);
+            for (int32_t u = 0; u < open.n && status == HS_OK; u++) {
+                count_pair(tally, &open.pair[u]);
+            }
+            open.n = 0;
+        }
     }
-    return decide_open(tally, scanner);
+    return status;
 }
 
 /* A hs_visit_fn for HS_BLOCK_LISTS_SQUARES. */
@@ -842,10 +699,19 @@ tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
     thread_tally        *tally = context;
     const hs_block      *block = &scanner->block;
     const point_weights *weights = &tally->plan->points.weights;
-    const edge_table    *table = table_for(tally, scanner->form->extent);
+    const tally_plan    *plan = tally->plan;
     const int32_t        n = hits->end[hits->n - 1];
     const bool           is_new = tally->block != scanner->n_blocks;
-    if (table == NULL) {
+    double               extent = scanner->form.extent; /* up to a power of two: there are few */
+    int                  exponent = 0;
+    if (!(extent > 0.0) || !isfinite(extent)) { /* NaN, with which nothing is sure, or one point */
+        extent = extent == 0.0 ? 0x1p-1000 : INFINITY;
+    } else if (frexp(extent, &exponent) > 0.5) {
+        extent = ldexp(1.0, exponent);
+    }
+    edge_table *table = &tally->tables[(unsigned)exponent % TALLY_TABLES];
+    if (table->extent != extent &&
+        build_table(plan->search, plan->histogram, extent, table) != HS_OK) {
         return HS_ERR_MEMORY;
     }
     /* Types and weights of the candidates, once for each block. */
@@ -856,21 +722,21 @@ tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
         tally->place[c] = weights->place != NULL ? weights->place[si] : 0;
     }
     for (int32_t c = 0; is_new && tally->type != NULL && c < block->n; c++) {
-        tally->type[c] = tally->plan->points.type[block->number[c]];
+        tally->type[c] = plan->points.type[block->number[c]];
     }
-    const bool has_places = weights->place != NULL || tally->plan->asking->weights.place != NULL;
+    const bool has_places = weights->place != NULL || plan->asking->weights.place != NULL;
     const bool is_open = find_slots(table, block->squares, n, tally->slots);
-    if (!tally->plan->has_types) {
+    if (!plan->has_types) {
         count_hits(tally, first, hits->label, 0, n);
     }
     for (int32_t t = 0, begin = 0; t < hits->n; t++) {
         const int32_t end = hits->end[t];
-        if (tally->plan->has_types) {
+        if (plan->has_types) {
             count_hits(tally, first + t, hits->label, begin, end);
         }
-        if (tally->plan->sums && has_places) {
+        if (plan->sums && has_places) {
             sum_hits(tally, first + t, hits->label, begin, end, true);
-        } else if (tally->plan->sums) {
+        } else if (plan->sums) {
             sum_hits(tally, first + t, hits->label, begin, end, false);
         }
         begin = end;
@@ -880,20 +746,30 @@ tally_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hit
 
 /* Edges, types and weights in the order of the cells, before any thread counts. */
 static hs_status
-open_plan(const hs_histogram *histogram, const hs_sets *sets, tally_plan *plan, hs_failure *failure)
+open_plan(const hs_sets *sets, tally_plan *plan, hs_failure *failure)
 {
-    hs_search  *search = plan->search;
-    hs_account *account = &search->call->account;
+    const hs_histogram *histogram = plan->histogram;
+    hs_search          *search = plan->search;
+    hs_shells          *shells = &search->shells;
+    hs_account         *account = &search->call->account;
     plan->has_types = histogram->n_types > 1;
     plan->n_types = histogram->n_types;
     plan->sums = histogram->sums != NULL;
     plan->asking = search->has_queries ? &plan->queries : &plan->points;
-    hs_status status =
-        edges_init(account, &search->scene, search->filter_error, histogram, &plan->edges);
-    if (status == HS_OK) {
-        status = marked_init(account, sets->of_points, search->bins.order, search->bins.n, plan,
-                             &plan->points, failure);
+    shells->n = histogram->n_edges - 1; /* the last one is the cutoff */
+    shells->inclusive = histogram->inclusive;
+    shells->memory = shells->at =
+        hs_alloc(account, HS_FOR_CANDIDATES, histogram->n_edges, sizeof *shells->at);
+    if (shells->memory == NULL) {
+        return HS_ERR_MEMORY;
     }
+    for (int64_t k = 0; k < histogram->n_edges; k++) {
+        shells->at[k] = search->scene.extreme
+                            ? histogram->edges[k]
+                            : hs_scale_apply(search->scene.scale, histogram->edges[k]);
+    }
+    hs_status status = marked_init(account, sets->of_points, search->bins.order, search->bins.n,
+                                   plan, &plan->points, failure);
     if (status == HS_OK && search->has_queries) {
         status = marked_init(account, sets->of_queries, search->query_bins.order,
                              search->query_bins.n, plan, &plan->queries, failure);
@@ -931,7 +807,7 @@ hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_set
                   int64_t *n_pairs, hs_failure *failure)
 {
     hs_account         *account = &search->call->account;
-    tally_plan          plan = {.search = search};
+    tally_plan          plan = {.search = search, .histogram = histogram};
     const hs_visitor    visitor = {.use = HS_BLOCK_LISTS_SQUARES,
                                    .visit = tally_hits,
                                    .shared = &plan,
@@ -940,7 +816,7 @@ hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_set
                                    .close = close_tally};
     const thread_tally *all = &plan.all;
     const int64_t       n_types = histogram->n_types, n = histogram->n_edges;
-    hs_status           status = open_plan(histogram, sets, &plan, failure);
+    hs_status           status = open_plan(sets, &plan, failure);
     if (status == HS_OK) {
         status = hs_parallel_visit(search, &visitor, NULL, failure);
     }
@@ -965,7 +841,6 @@ hs_histogram_fill(hs_search *search, const hs_histogram *histogram, const hs_set
         }
     }
     free_tally(account, &plan.all);
-    hs_free(account, plan.edges.at);
     for (int s = 0; s < 2; s++) {
         marked_set *set = s == 0 ? &plan.points : &plan.queries;
         hs_free(account, set->type);

@@ -1,14 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "levels.h"
 #include "../base/status.h"
-#include "../scene/points.h"
 #include "../base/sort.h"
-#include "../cells/grid.h"
 #include "../search/choice.h"
-#include "../search/search.h"
-
-#include <math.h>
-#include <string.h>
 
 /* levels.c: supports are read and checked, points divided into levels, and steps planned between
  * these; a level as others see it is a set of points by itself. */
@@ -245,9 +239,6 @@ read_input(division *by, level_input *set, hs_failure *failure)
     return status;
 }
 
-/* One pass finds the level of each point, a counting sort puts the levels in order and reads the
- * points. */
-
 /* Sizes count the binary orders of a radius below the largest one, and zero as the smallest. */
 #define LEAST_EXPONENT (-1074)
 #define N_SIZES        (1 - LEAST_EXPONENT)
@@ -285,8 +276,6 @@ arrange(const division *by, level_input *from, int32_t n_levels, hs_level_set *t
     to->rows = hs_alloc(by->account, HS_FOR_POINTS, n * to->ndim, sizeof *to->rows);
     to->number = hs_alloc(by->account, HS_FOR_ORDER, n, sizeof *to->number);
     to->first = hs_alloc(by->account, HS_FOR_CELLS, (int64_t)n_levels + 1, sizeof *to->first);
-    to->radii = NULL;
-    to->range = NULL;
     if (has_radii(from)) {
         to->radii = hs_alloc(by->account, HS_FOR_POINTS, n, sizeof *to->radii);
         to->range = hs_alloc(by->account, HS_FOR_CELLS, n_levels, sizeof *to->range);
@@ -378,9 +367,6 @@ divide(division *by, level_input *inputs, hs_levels *levels, hs_failure *failure
     memset(by->count, 0, (size_t)by->n_sizes * sizeof *by->count);
     for (int s = 0; s < n && status == HS_OK; s++) {
         status = read_input(by, &inputs[s], failure);
-    }
-    if (status != HS_OK) {
-        return status;
     }
     for (int s = 0; s < n && status == HS_OK && !has_types; s++) {
         status = find_sizes(by, &inputs[s]);
@@ -582,17 +568,9 @@ hs_level_plan_free(hs_account *account, hs_level_plan *plan)
  * more than that, and the one with fewer tests is favoured too little. */
 
 #ifdef HS_TESTING
-static bool joins = false;
-
-bool
-hs_test_join_levels(bool on)
-{
-    const bool before = joins;
-    joins = on;
-    return before;
-}
+bool hs_test_joins_levels;
 #else
-enum { joins = true };
+enum { hs_test_joins_levels = true };
 #endif
 
 /* More levels than this are hardly ever better searched at once. */
@@ -689,7 +667,7 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, const hs_box *b
         }
     }
     HS_ASSERT(plan->n <= n * most);
-    if (!joins || algorithm != HS_AUTO || levels->cutoffs != NULL || plan->n < 2 ||
+    if (!hs_test_joins_levels || algorithm != HS_AUTO || levels->cutoffs != NULL || plan->n < 2 ||
         n > MOST_JOINED) {
         return HS_OK;
     }
@@ -705,9 +683,6 @@ hs_level_plan_make(hs_account *account, const hs_levels *levels, const hs_box *b
     }
     return HS_OK;
 }
-
-/* Radii, types and supports come in the order of levels, and are laid out in the order of the
- * cells. */
 
 /* Scaled radii that are larger are beyond all distances: the scale goes by a cutoff that is no
  * larger than these. */
@@ -870,8 +845,6 @@ level_limits_set(const hs_levels *levels, const hs_level_step *step, double boun
     }
     return status;
 }
-
-/* Opens the search of two slices, has its limits set, and gives its points the caller's numbers. */
 
 static void
 renumber(const int32_t *number, hs_bins *bins)

@@ -2,9 +2,6 @@
 #ifndef HS_LEVELS_LEVELS_H
 #define HS_LEVELS_LEVELS_H
 
-#include "../base/os.h"
-#include "../memory/memory.h"
-#include "../scene/scene.h"
 #include "../search/limits.h"
 
 /*
@@ -129,9 +126,8 @@ hs_status hs_level_plan_make(hs_account *account, const hs_levels *levels, const
                              double bound, hs_algorithm algorithm, hs_level_plan *plan);
 
 #ifdef HS_TESTING
-/* Whether plans are replaced; off at first, so that few points have several searches. Returns what
- * it was before. */
-bool hs_test_join_levels(bool on);
+/* Whether plans are replaced; off at first, so that few points have several searches. */
+extern bool hs_test_joins_levels;
 #endif
 
 /*

@@ -7,7 +7,6 @@
 #include "../base/os_thread.h"
 
 #include <math.h>
-#include <string.h>
 
 /* memory.c: accounts, blocks and arenas. Each block is a chunk (results.h), or lies in the arena
  * behind a header like one, of which `bytes`, `raw` (NULL) and `length` (0) are set. */
@@ -17,7 +16,7 @@
 
 static _Atomic int64_t fail_countdown;
 static _Atomic int64_t live_blocks;
-static bool            arena_is_used;
+bool                   hs_test_uses_arena;
 
 void
 hs_test_fail_allocation(int64_t nth)
@@ -52,14 +51,8 @@ hs_test_count_block(int change)
 {
     live_blocks += change;
 }
-
-void
-hs_test_use_arena(bool on)
-{
-    arena_is_used = on;
-}
 #else
-enum { arena_is_used = 1 };
+enum { hs_test_uses_arena = true };
 #endif
 
 /* In tests new blocks are not zero by chance, unless a sanitizer watches them. */
@@ -180,7 +173,7 @@ hs_alloc(hs_account *account, hs_purpose purpose, int64_t count, size_t size)
         return NULL;
     }
     void *block = NULL;
-    if (HS_HAVE_ARENA && arena_is_used && account != NULL && bytes < LARGEST_IN_ARENA) {
+    if (HS_HAVE_ARENA && hs_test_uses_arena && account != NULL && bytes < LARGEST_IN_ARENA) {
         if (account->arena == NULL) {
             account->arena = account->is_kept ? NULL : hs_pool_take(HS_POOL_SCRATCH, true);
             account->arena = account->arena != NULL ? account->arena : hs_chunk_new(HS_ARENA_BYTES);
@@ -236,6 +229,21 @@ hs_grow(hs_account *account, hs_purpose purpose, void *block, int64_t held, int6
     return larger;
 }
 
+void *
+hs_reserve(void **block, hs_purpose purpose, int64_t count, size_t size)
+{
+    if (*block == NULL || (double)count * (double)size > (double)hs_chunk_of(*block)->bytes) {
+        /* An eighth more: the next one is likely to be a little larger. */
+        void *larger = hs_alloc(NULL, purpose, count + count / 8, size);
+        if (larger == NULL) {
+            return NULL;
+        }
+        hs_free(NULL, *block);
+        *block = larger;
+    }
+    return *block;
+}
+
 void
 hs_trim(hs_account *account, void *block, size_t bytes)
 {
@@ -279,8 +287,6 @@ hs_free(hs_account *account, void *block)
     }
     hs_chunk_free(block);
 }
-
-/* A mutex around each change of the account. */
 
 struct hs_shared {
     hs_account *account;
@@ -329,8 +335,6 @@ hs_shared_release(hs_shared *shared, void **block)
     *block = NULL;
     hs_mutex_unlock(&shared->mutex);
 }
-
-/* Every array begins on a cache line of the block. */
 
 void *
 hs_parts_alloc(hs_account *account, hs_purpose purpose, const hs_parts *parts)

@@ -91,7 +91,7 @@ bool hs_test_failure_is_due(void);
 /* Blocks and arenas that are allocated and not yet freed, in the whole process. */
 int64_t hs_test_live_blocks(void);
 /* Whether accounts have an arena, where the build has one; off at first. */
-void hs_test_use_arena(bool on);
+extern bool hs_test_uses_arena;
 /* For what hands out memory: asks whether this allocation is the one to fail, and counts a block
  * more (1) or less (-1). */
 bool hs_test_allocation_fails(void);
@@ -158,37 +158,8 @@ hs_parts_add(hs_parts *parts, void **to, int64_t count, size_t size)
  * has been written. */
 void *hs_parts_alloc(hs_account *account, hs_purpose purpose, const hs_parts *parts);
 
-/* An array that is used again and again, and allocated anew only when it must grow. */
-
-typedef struct hs_store {
-    void   *data;     /* owned; NULL at first */
-    int64_t capacity; /* bytes */
-} hs_store;
-
-/* Room for count * size bytes, of any content, or NULL: then what it had is still there. */
-HS_ALWAYS_INLINE void *
-hs_store_reserve(hs_store *store, hs_purpose purpose, int64_t count, size_t size)
-{
-    if (store->data != NULL && (double)count * (double)size <= (double)store->capacity) {
-        return store->data;
-    }
-    /* An eighth more: the next one is likely to be a little larger. */
-    void *data = hs_alloc(NULL, purpose, count + count / 8, size);
-    if (data == NULL) {
-        return NULL;
-    }
-    hs_free(NULL, store->data);
-    store->data = data;
-    store->capacity = (count + count / 8) * (int64_t)size;
-    return data;
-}
-
-/* Idempotent. */
-HS_ALWAYS_INLINE void
-hs_store_free(hs_store *store)
-{
-    hs_free(NULL, store->data);
-    *store = (hs_store){0};
-}
+/* Room for count * size bytes, of any content, for an array that is used again and again: *block is
+ * NULL at first, and replaced when it must grow. NULL when refused: then *block is as it was. */
+void *hs_reserve(void **block, hs_purpose purpose, int64_t count, size_t size);
 
 #endif

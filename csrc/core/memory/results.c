@@ -10,7 +10,6 @@
 #include "../base/os_thread.h"
 
 #include <stdlib.h>
-#include <string.h>
 
 /* results.c: pages from Linux, chunks of these or of malloc, the pool, which is an array of chunks,
  * oldest first, and regions: each is one chunk, taken from the pool if it has one and given back to
@@ -547,8 +546,6 @@ hs_pool_give(void *data)
     free_all(removed, n);
     return keep;
 }
-
-/* Regions. */
 
 /* Address space without memory that a chunk takes along to the pool, so that the next request needs
  * no system call. More would only use up address space. */

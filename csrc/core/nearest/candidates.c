@@ -165,11 +165,14 @@ hs_nearest_guess(const hs_nearest *near, double scale, hs_nearest_group *group)
         group->more = wanted * ratio;
         radius = wider < INFINITY ? wider : near->least;
     }
-    /* A ball that sticks out of all points along open axes holds fewer. */
+    /* A ball that sticks out of all points along open axes holds fewer; where they are less wide
+     * than the ball, the density says so already. */
     for (int c = 0; c < d; c++) {
         const double below = hs_smaller(middle[c] - tree->lower[c], radius);
         const double above = hs_smaller(tree->upper[c] - middle[c], radius);
-        if (lattice->n_periodic < d && (!lattice->aligned || lattice->row_of_axis[c] < 0)) {
+        const bool   is_wide = tree->upper[c] - tree->lower[c] >= 2.0 * radius;
+        if (is_wide && lattice->n_periodic < d &&
+            (!lattice->aligned || lattice->row_of_axis[c] < 0)) {
             outside -= log2(fmin(fmax((below + above) / (2.0 * radius), 0.5), 1.0));
         }
     }
@@ -293,7 +296,7 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
     const hs_lattice *lattice = &scene->lattice;
     const double      roundings = 2 * lattice->n_periodic + 4;
     double            most[HS_MAX_DIM] = {0.0}, error = 0.0;
-    *images = (hs_nearest_images){.lattice = lattice, .count = 1.0, .is_first = true};
+    *images = (hs_nearest_images){.lattice = lattice, .count = 1.0};
     /* The drift depends on the largest shifts, and these a little on the drift. */
     for (int pass = 0; group != NULL && pass < (lattice->aligned ? 1 : 3); pass++) {
         for (int k = 0; k < lattice->ndim; k++) {
@@ -306,7 +309,6 @@ hs_nearest_images_start(const hs_nearest *near, const hs_nearest_group *group,
         }
     }
     for (int r = 0; r < lattice->n_periodic; r++) {
-        images->next.shift[r] = (int32_t)images->low[r];
         images->count *= hs_larger((double)(images->high[r] - images->low[r] + 1), 0.0);
     }
     /* Of X_j + moved, by the rule of docs/exactness.md for gathered candidates. */
@@ -331,26 +333,19 @@ hs_nearest_images_next(hs_nearest_images *images)
 {
     const hs_lattice *lattice = images->lattice;
     hs_nearest_image *next = &images->next;
-    const int         m = lattice->n_periodic;
-    int               r = 0;
-    while (!images->is_first && r < m && next->shift[r] == images->high[r]) {
-        next->shift[r] = (int32_t)images->low[r];
-        r++;
-    }
-    if (images->is_first ? images->count == 0.0 : r == m) {
+    int64_t           rest = images->n_met++;
+    if ((double)rest >= images->count) {
         return false;
     }
-    next->shift[r] += !images->is_first;
-    images->is_first = false;
-    next->is_home = true;
-    for (int c = 0; c < lattice->ndim; c++) {
-        next->moved[c] = 0.0;
-        for (r = 0; r < m; r++) {
+    *next = (hs_nearest_image){.is_home = true};
+    for (int r = 0; r < lattice->n_periodic; r++) { /* the first row fastest */
+        const int64_t n = images->high[r] - images->low[r] + 1;
+        next->shift[r] = (int32_t)(images->low[r] + rest % n);
+        next->is_home = next->is_home && next->shift[r] == 0;
+        rest /= n;
+        for (int c = 0; c < lattice->ndim; c++) {
             next->moved[c] += next->shift[r] * lattice->rows[r][c];
         }
-    }
-    for (r = 0; r < m; r++) {
-        next->is_home = next->is_home && next->shift[r] == 0;
     }
     return true;
 }
@@ -461,11 +456,12 @@ add_leaf(const hs_nearest *near, int32_t number, hs_nearest_leaves *leaves)
 
 /* Adds the leaves of the last image whose squared distance is within `limit`; false when there are
  * too many. */
-HS_ALWAYS_INLINE bool
+static bool
 find_leaves_in_image(const hs_nearest *near, const hs_nearest_group *group, double limit,
-                     double most, hs_nearest_leaves *leaves, const int ndim)
+                     double most, hs_nearest_leaves *leaves)
 {
     const hs_tree *tree = &near->tree;
+    const int      ndim = tree->ndim;
     const double  *moved = leaves->images[leaves->n_images - 1].moved;
     double         low[HS_MAX_DIM] = {0.0}, high[HS_MAX_DIM] = {0.0};
     int64_t        n_waiting = 0;
@@ -537,11 +533,7 @@ hs_nearest_leaves_find(const hs_nearest *near, const hs_nearest_group *group, do
     while (fit && hs_nearest_images_next(&images)) {
         const int32_t n = leaves->n;
         leaves->images[leaves->n_images++] = images.next;
-        switch (d) {
-        case 2: fit = find_leaves_in_image(near, group, limit, most, leaves, 2); break;
-        case 3: fit = find_leaves_in_image(near, group, limit, most, leaves, 3); break;
-        default: fit = find_leaves_in_image(near, group, limit, most, leaves, d);
-        }
+        fit = find_leaves_in_image(near, group, limit, most, leaves);
         leaves->n_images -= leaves->n == n; /* nothing there */
     }
     leaves->radius = fit ? group->radius : 0.0;

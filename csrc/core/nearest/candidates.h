@@ -52,7 +52,7 @@ typedef struct hs_nearest_images {
     double            error; /* on each component of (X_j + moved) - X_i, but for the last
                               * rounding */
     double            count; /* of images */
-    bool              is_first;
+    int64_t           n_met; /* of them, the present one as well */
 } hs_nearest_images;
 
 /* Those that are near a group; of NULL, the points where they are. HS_TRY_OTHER when there are more

@@ -91,9 +91,8 @@ build_tree(hs_nearest *near, int32_t leaf_points)
     hs_scene        *scene = &search->scene;
     const hs_metric *metric = &scene->metric;
     hs_metric_init(&near->order, scene->ndim, metric->n_rows, metric->rows, 1.0, true);
-    const hs_status status = hs_tree_build(&search->call->account, search->call->team,
-                                           &search->call->options, scene, leaf_points,
-                                           &search->bins, &near->tree);
+    const hs_status status =
+        hs_tree_build(search->call, scene, leaf_points, &search->bins, &near->tree);
     if (status == HS_OK) {
         hs_nearest_measure(near);
     }
@@ -106,9 +105,8 @@ build_asking_tree(hs_nearest *near, hs_scene *asking)
 {
     hs_search *search = near->search;
     search->has_queries = true;
-    const hs_status status = hs_tree_build(&search->call->account, search->call->team,
-                                           &search->call->options, asking, LEAF_POINTS,
-                                           &search->query_bins, &near->asking_tree);
+    const hs_status status =
+        hs_tree_build(search->call, asking, LEAF_POINTS, &search->query_bins, &near->asking_tree);
     hs_scene_free(&search->call->account, asking);
     return status;
 }
@@ -314,7 +312,7 @@ typedef struct nearest_worker {
     hs_nearest_writer  writer;
     double             scale;   /* of the next guess */
     double             longest; /* distance of a k-th nearest in this group; 0: none */
-    int64_t            n_groups, n_candidates;
+    hs_counters        done;
 } nearest_worker;
 
 /* Writes the row of the ranker's point, unless something failed, and names the point where that is
@@ -361,8 +359,8 @@ search_point(nearest_worker *worker, int32_t si)
     if (!is_endless) {
         status = hs_nearest_walk(ranker, &count);
     }
-    worker->n_groups++;
-    worker->n_candidates += ranker->n_met - n_met;
+    worker->done.groups++;
+    worker->done.candidates += ranker->n_met - n_met;
     return write_row(worker, count, status);
 }
 
@@ -377,8 +375,8 @@ search_block(nearest_worker *worker, const hs_nearest_group *group, uint64_t *le
     const double      wanted = near->search->call->choice == NULL ? (double)near->k : INFINITY;
     int32_t           end[HS_GROUP_POINTS], n_many = 0;
     hs_status         status = HS_OK;
-    worker->n_groups++;
-    worker->n_candidates += (int64_t)n_points * block->n;
+    worker->done.groups++;
+    worker->done.candidates += (int64_t)n_points * block->n;
     for (int32_t first = 0, next; first < n_points && status == HS_OK; first = next) {
         if (first > 0 && n_many == first) { /* all so far: the others, too, probably */
             *left = UINT64_MAX;
@@ -500,8 +498,7 @@ open_worker(void *context, void *place)
     worker->ranker.near = near;
     worker->ranker.options = worker->committer.options;
     hs_nearest_writer_init(near, &worker->writer);
-    const hs_status status = hs_nearest_ranker_init(&worker->ranker);
-    return status == HS_OK ? hs_nearest_writer_open(&worker->writer) : status;
+    return HS_OK;
 }
 
 static void
@@ -510,18 +507,13 @@ close_worker(void *context, void *place)
     const nearest_job *job = context;
     nearest_worker    *worker = place;
     const hs_stages   *stages = &worker->ranker.stages;
-    const hs_counters  walked = {.groups = worker->n_groups,
-                                 .candidates = worker->n_candidates,
-                                 .ambiguous = worker->ranker.n_compared,
-                                 .by_float64 = stages->by_float64,
-                                 .by_double_word = stages->by_double_word,
-                                 .by_integers = stages->by_integers};
-    if (worker->writer.pairs != NULL) { /* all of it was opened */
-        hs_nearest_flush(&worker->writer);
-    }
-    hs_call_add_counters(job->near->search->call, &walked);
+    worker->done.ambiguous = worker->ranker.n_compared;
+    worker->done.by_float64 = stages->by_float64;
+    worker->done.by_double_word = stages->by_double_word;
+    worker->done.by_integers = stages->by_integers;
+    hs_nearest_flush(&worker->writer);
+    hs_call_add_counters(job->near->search->call, &worker->done);
     hs_nearest_ranker_free(&worker->ranker);
-    hs_shared_release(job->near->shared, (void **)&worker->writer.pairs);
     hs_shared_release(job->near->shared, &worker->shared.memory);
     hs_shared_release(job->near->shared, &worker->own.memory);
     hs_shared_release(job->near->shared, &worker->block.memory);

@@ -21,17 +21,6 @@
 /* What deciding whether a point counts may take, in points: images of it are compared. */
 #define STEPS_OF_CHOICE 16
 
-hs_status
-hs_nearest_ranker_init(hs_nearest_ranker *ranker)
-{
-    const hs_nearest *near = ranker->near;
-    const int64_t     room = near->tree.depth + 2;
-    return hs_shared_resize(near->shared, (void **)&ranker->waiting, 0, room,
-                            sizeof *ranker->waiting)
-               ? HS_OK
-               : HS_ERR_MEMORY;
-}
-
 void
 hs_nearest_ranker_free(hs_nearest_ranker *ranker)
 {
@@ -693,6 +682,11 @@ hs_nearest_walk(hs_nearest_ranker *ranker, int64_t *count)
     const double      period = near->smallest_period;
     double            widest = period < INFINITY ? period : 0.0;
     hs_nearest_group  group;
+    if (ranker->waiting == NULL &&
+        !hs_shared_resize(near->shared, (void **)&ranker->waiting, 0, near->tree.depth + 2,
+                          sizeof *ranker->waiting)) {
+        return HS_ERR_MEMORY;
+    }
     hs_nearest_group_set(near, ranker->si, ranker->si + 1, &group);
     for (int k = 0; k < near->tree.ndim; k++) {
         widest = hs_larger(fabs(near->tree.upper[k] - group.lower[k]), widest);
@@ -841,26 +835,6 @@ hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer)
     writer->S = hs_output_column(near->rows, HS_WANT_SHIFT);
 }
 
-hs_status
-hs_nearest_writer_open(hs_nearest_writer *writer)
-{
-    const hs_nearest *near = writer->near;
-    hs_measured      *pairs;
-    if (!hs_shared_resize(near->shared, (void **)&writer->pairs, 0, 1, sizeof *pairs)) {
-        return HS_ERR_MEMORY;
-    }
-    pairs = writer->pairs;
-    pairs->n = 0;
-    pairs->is_shifted = pairs->is_wide = false;
-    for (int k = 0; k < near->tree.ndim; k++) {
-        memset(pairs->p[k], 0, sizeof pairs->p[k]);
-        memset(pairs->q[k], 0, sizeof pairs->q[k]);
-        memset(pairs->times[k], 0, sizeof pairs->times[k]);
-        memset(pairs->shift[k], 0, sizeof pairs->shift[k]);
-    }
-    return HS_OK;
-}
-
 void
 hs_nearest_prefetch(const hs_nearest_writer *writer, int32_t si)
 {
@@ -902,7 +876,7 @@ hs_nearest_flush(hs_nearest_writer *writer)
 {
     const hs_search *search = writer->near->search;
     const hs_scale   unscale = hs_measures_unscale(&search->scene);
-    hs_measured     *pairs = writer->pairs;
+    hs_measured     *pairs = &writer->pairs;
     const int        d = search->scene.ndim;
     if (pairs->n > 0 && (writer->d != NULL || writer->D != NULL)) {
         hs_measured_find(search->call->kernel, &writer->near->order, writer->D != NULL, pairs);
@@ -950,7 +924,7 @@ put_entries(hs_nearest_writer *writer, const hs_nearest_ranker *ranker, const hs
 {
     const hs_bins *bins = &writer->near->search->bins;
     const int     *vector_of_row = writer->near->search->scene.lattice.vector_of_row;
-    hs_measured   *pairs = writer->pairs;
+    hs_measured   *pairs = &writer->pairs;
     const bool needs_given = bins->n_periodic > 0 && (bins->keeps_originals || writer->S != NULL);
     int32_t    j[HS_BATCH];
     double     p[HS_MAX_DIM];
@@ -1031,7 +1005,7 @@ hs_nearest_write(hs_nearest_writer *writer, hs_nearest_ranker *ranker, int64_t c
     const int64_t     row = hs_search_asking(near->search)->order[ranker->si];
     count = count_within(ranker, count);
     for (int64_t e = 0; e < count;) {
-        const int64_t   room = HS_BATCH - writer->pairs->n;
+        const int64_t   room = HS_BATCH - writer->pairs.n;
         const int32_t   n = (int32_t)(count - e < room ? count - e : room);
         const hs_status status =
             put_entries(writer, ranker, ranker->keys + e, n, row * near->k + e, e == 0);
@@ -1039,7 +1013,7 @@ hs_nearest_write(hs_nearest_writer *writer, hs_nearest_ranker *ranker, int64_t c
             return status;
         }
         e += n;
-        if (writer->pairs->n == HS_BATCH) {
+        if (writer->pairs.n == HS_BATCH) {
             hs_nearest_flush(writer);
         }
     }

@@ -28,7 +28,7 @@ typedef struct hs_nearest_waiting {
 /* Steps between two polls: some milliseconds, even of exact comparisons. */
 #define HS_NEAREST_POLL_STEPS (INT64_C(1) << 15)
 
-/* Owned by a thread. */
+/* Owned by a thread; zeros at first, but for what is borrowed. */
 typedef struct hs_nearest_ranker {
     const hs_nearest       *near;    /* borrowed */
     const hs_options       *options; /* borrowed; polled */
@@ -47,13 +47,11 @@ typedef struct hs_nearest_ranker {
     int64_t             n_least, least_capacity;
     hs_nearest_image   *walked; /* owned: images in which keys are */
     int32_t             n_walked, walked_capacity;
-    hs_nearest_waiting *waiting; /* owned: nodes that are left to look at */
+    hs_nearest_waiting *waiting; /* owned: nodes that are left to look at; NULL before a walk */
     int64_t             n_met;   /* points so far */
 } hs_nearest_ranker;
 
-/* For the near and options that are set. hs_nearest_ranker_free in any case. */
-hs_status hs_nearest_ranker_init(hs_nearest_ranker *ranker);
-void      hs_nearest_ranker_free(hs_nearest_ranker *ranker);
+void hs_nearest_ranker_free(hs_nearest_ranker *ranker);
 
 /* Whose keys come next. */
 void hs_nearest_ranker_set(hs_nearest_ranker *ranker, int32_t si);
@@ -83,14 +81,11 @@ typedef struct hs_nearest_writer {
     int32_t          *S;
     int64_t           at[HS_BATCH];       /* entry of the output */
     bool              is_first[HS_BATCH]; /* of its row */
-    hs_measured      *pairs; /* owned; shifts are zero from the first entry that is free on */
+    hs_measured       pairs;              /* shifts are zero from the first entry that is free on */
 } hs_nearest_writer;
 
-/* A writer of zeros; without `pairs`, where nothing is measured. */
+/* Of a writer of zeros. */
 void hs_nearest_writer_init(const hs_nearest *near, hs_nearest_writer *writer);
-
-/* Its pairs, as far as kernels read them: a little beyond the last entry. HS_ERR_MEMORY. */
-hs_status hs_nearest_writer_open(hs_nearest_writer *writer);
 
 /* The row of the ranker's point: the first `count` of its keys, as far as they are within the
  * largest distance, and then entries that stand for no neighbour. HS_ERR_SHIFT_RANGE. */

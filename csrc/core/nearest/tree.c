@@ -43,18 +43,16 @@ typedef struct subtree {
 } subtree;
 
 typedef struct tree_builder {
-    hs_account       *account;
-    hs_shared        *shared;
-    hs_team          *team;
-    const hs_options *options;
-    const hs_bins    *bins;
-    int32_t          *order; /* numbers of points, of each node those from `first` to `end` */
-    int32_t          *aside; /* room for as many */
-    int32_t           leaf_points;
-    hs_tree          *tree;
-    subtree          *round;          /* owned; those of the present round */
-    int32_t           n_round, first; /* the first of those that are split now */
-    int64_t           work;           /* since the last poll, in points that are split once */
+    hs_call       *call;
+    hs_shared     *shared;
+    const hs_bins *bins;
+    int32_t       *order; /* numbers of points, of each node those from `first` to `end` */
+    int32_t       *aside; /* room for as many */
+    int32_t        leaf_points;
+    hs_tree       *tree;
+    subtree       *round;          /* owned; those of the present round */
+    int32_t        n_round, first; /* the first of those that are split now */
+    int64_t        work;           /* since the last poll, in points that are split once */
 } tree_builder;
 
 /* Where a node is split: what is below the pivot goes left. */
@@ -228,7 +226,7 @@ split_subtree(void *context, int64_t task)
 static hs_status
 split_round(tree_builder *builder)
 {
-    const int64_t most = HS_POLL_POINTS * (int64_t)hs_team_size(builder->team);
+    const int64_t most = HS_POLL_POINTS * (int64_t)hs_team_size(builder->call->team);
     hs_status     status = HS_OK;
     for (int32_t next = 0; next < builder->n_round && status == HS_OK;) {
         builder->first = next;
@@ -237,13 +235,13 @@ split_round(tree_builder *builder)
             const int64_t  n = hs_tree_points(&builder->tree->nodes[sub->root]);
             builder->work += sub->is_large ? n : SUBTREE_SPLITS * n;
         }
-        hs_team_run(builder->team, next - builder->first, split_subtree, builder);
+        hs_team_run(builder->call->team, next - builder->first, split_subtree, builder);
         for (int32_t s = builder->first; s < next && status == HS_OK; s++) {
             status = builder->round[s].status;
         }
         if (status == HS_OK && builder->work >= most) {
             builder->work = 0;
-            status = hs_poll(builder->options, 0.0);
+            status = hs_poll(&builder->call->options, 0.0);
         }
     }
     return status;
@@ -255,13 +253,10 @@ reserve(tree_builder *builder, int64_t n)
 {
     hs_tree      *tree = builder->tree;
     hs_tree_node *nodes = n > INT32_MAX ? NULL
-                                        : hs_grow(builder->account, HS_FOR_CELLS, tree->nodes,
-                                                  tree->n_nodes, n, sizeof *nodes);
-    if (nodes == NULL) {
-        return HS_ERR_MEMORY;
-    }
-    tree->nodes = nodes;
-    return HS_OK;
+                                        : hs_grow(&builder->call->account, HS_FOR_CELLS,
+                                                  tree->nodes, tree->n_nodes, n, sizeof *nodes);
+    tree->nodes = nodes != NULL ? nodes : tree->nodes;
+    return nodes != NULL ? HS_OK : HS_ERR_MEMORY;
 }
 
 /* Appends what the nodes of the round became to the tree; *next: those of the next round, for all
@@ -297,10 +292,11 @@ static hs_status
 build_nodes(tree_builder *builder)
 {
     hs_tree      *tree = builder->tree;
+    hs_account   *account = &builder->call->account;
     const int32_t n = (int32_t)builder->bins->n;
     hs_status     status = reserve(builder, 1);
-    builder->round = hs_alloc(builder->account, HS_FOR_CELLS, 1, sizeof *builder->round);
-    builder->shared = hs_shared_new(builder->account, HS_FOR_CELLS);
+    builder->round = hs_alloc(account, HS_FOR_CELLS, 1, sizeof *builder->round);
+    builder->shared = hs_shared_new(account, HS_FOR_CELLS);
     if (builder->round == NULL || builder->shared == NULL) {
         status = HS_ERR_MEMORY;
     }
@@ -310,9 +306,8 @@ build_nodes(tree_builder *builder)
     }
     while (status == HS_OK && builder->n_round > 0) {
         const int32_t n_round = builder->n_round;
-        subtree      *next =
-            hs_alloc(builder->account, HS_FOR_CELLS, INT64_C(2) * n_round, sizeof *next);
-        int32_t n_next = 0;
+        subtree      *next = hs_alloc(account, HS_FOR_CELLS, INT64_C(2) * n_round, sizeof *next);
+        int32_t       n_next = 0;
         status = next != NULL ? split_round(builder) : HS_ERR_MEMORY;
         if (status == HS_OK) {
             status = append_round(builder, next, &n_next);
@@ -320,11 +315,11 @@ build_nodes(tree_builder *builder)
         for (int32_t s = 0; s < n_round; s++) {
             hs_shared_release(builder->shared, (void **)&builder->round[s].nodes);
         }
-        hs_free(builder->account, builder->round);
+        hs_free(account, builder->round);
         builder->round = next;
         builder->n_round = n_next;
     }
-    hs_free(builder->account, builder->round);
+    hs_free(account, builder->round);
     hs_shared_free(builder->shared);
     return status;
 }
@@ -376,12 +371,9 @@ set_leaves(void *context, int64_t task)
 }
 
 hs_status
-hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_scene *scene,
-              int32_t leaf_points, hs_bins *bins, hs_tree *tree)
+hs_tree_build(hs_call *call, hs_scene *scene, int32_t leaf_points, hs_bins *bins, hs_tree *tree)
 {
-    tree_builder builder = {.account = account,
-                            .team = team,
-                            .options = options,
+    tree_builder builder = {.call = call,
                             .bins = bins,
                             .order = scene->cloud.order,
                             .aside = (int32_t *)(void *)scene->cloud.spare,
@@ -394,11 +386,11 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
     }
     hs_status status = bins->n > 0 ? build_nodes(&builder) : HS_OK;
     if (status == HS_OK) {
-        status = hs_bins_arrange(account, team, options, scene, bins);
+        status = hs_bins_arrange(&call->account, call->team, &call->options, scene, bins);
     }
     if (status == HS_OK) {
-        tree->bounds = hs_alloc(account, HS_FOR_CELLS, (int64_t)tree->n_nodes * 2 * tree->ndim,
-                                sizeof(double));
+        tree->bounds = hs_alloc(&call->account, HS_FOR_CELLS,
+                                (int64_t)tree->n_nodes * 2 * tree->ndim, sizeof(double));
         status = tree->bounds == NULL ? HS_ERR_MEMORY : HS_OK;
     }
     if (status == HS_OK && tree->n_nodes > 0) {
@@ -411,7 +403,7 @@ hs_tree_build(hs_account *account, hs_team *team, const hs_options *options, hs_
                 steps[left] = steps[left + 1] = steps[number] + 1.0;
             }
         }
-        hs_team_run(team, (tree->n_nodes - 1) / NODES_AT_ONCE + 1, set_leaves, &builder);
+        hs_team_run(call->team, (tree->n_nodes - 1) / NODES_AT_ONCE + 1, set_leaves, &builder);
         for (int32_t number = tree->n_nodes - 1; number >= 0; number--) {
             if (tree->nodes[number].left != 0) { /* children come after their parents */
                 set_range(&builder, number);

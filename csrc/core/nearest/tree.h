@@ -90,8 +90,8 @@ hs_tree_gap(const hs_tree *tree, const double *low, const double *high, double u
  * same for any team. bins->start stays NULL. HS_ERR_MEMORY, HS_ERR_INTERRUPTED; on failure bins and
  * tree are to be freed as well.
  */
-hs_status hs_tree_build(hs_account *account, hs_team *team, const hs_options *options,
-                        hs_scene *scene, int32_t leaf_points, hs_bins *bins, hs_tree *tree);
+hs_status hs_tree_build(hs_call *call, hs_scene *scene, int32_t leaf_points, hs_bins *bins,
+                        hs_tree *tree);
 
 /* Idempotent; does nothing to a tree of zeros. */
 void hs_tree_free(hs_account *account, hs_tree *tree);

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "table.h"
-#include "../base/status.h"
+#include "../base/sort.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
-#include "../search/walk.h"
 
 #include <math.h>
 #include <string.h>
@@ -113,7 +112,7 @@ put_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
     }
     if (to != &fill->visit) {
         for (int32_t t = 0, from = 0; t < rows.n; from = rows.end[t++]) {
-            offsets[rows.point[t]] = rows.end[t] - from;
+            offsets[rows.point[t] + 1] = rows.end[t] - from;
         }
         return to->n_pairs * hs_output_bytes_per_pair(to) > MOST_KEPT ? HS_TRY_OTHER : HS_OK;
     }
@@ -123,30 +122,41 @@ put_rows(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
     return HS_OK;
 }
 
-/* to: NULL, or where all rows are kept. most_hits: of a visit. */
-static hs_status
-filler_open(table *all, hs_output *to, int32_t most_hits, row_filler *fill)
-{
-    const hs_output *entries = all->entries;
-    *fill = (row_filler){.all = all, .to = to != NULL ? to : &fill->visit};
-    hs_output_init(NULL, entries->ndim, entries->columns, entries->index_bytes, &fill->visit);
-    return hs_recorder_init(&all->search->call->account, fill->to, most_hits, &fill->recorder);
-}
-
 /* A hs_visitor's open. */
 static hs_status
-open_filler(void *all, void *filler, const hs_walker *walker)
+open_filler(void *context, void *filler, const hs_walker *walker)
 {
-    return filler_open(all, NULL, walker->scanner.block.most_hits, filler);
+    table           *all = context;
+    row_filler      *fill = filler;
+    const hs_output *entries = all->entries;
+    fill->all = all;
+    fill->to = all->kept.columns != 0 ? &all->kept : &fill->visit;
+    hs_output_init(NULL, entries->ndim, entries->columns, entries->index_bytes, &fill->visit);
+    return hs_recorder_init(&all->search->call->account, fill->to, walker->scanner.block.most_hits,
+                            &fill->recorder);
 }
 
-/* Idempotent, also of one that is all zeros. A hs_visitor's close. */
+/* A hs_visitor's close. */
 static void
 close_filler(void *all, void *filler)
 {
     row_filler *fill = filler;
     hs_recorder_free(&((table *)all)->search->call->account, &fill->recorder);
     hs_output_free(&fill->visit);
+}
+
+/* The walk that finds all rows, which it keeps, or writes to their places. */
+static hs_status
+walk_rows(table *all, hs_failure *failure)
+{
+    const hs_visitor filler = {.use = hs_record_use(all->entries->columns),
+                               .most = &all->most,
+                               .visit = put_rows,
+                               .shared = all,
+                               .state_size = sizeof(row_filler),
+                               .open = open_filler,
+                               .close = close_filler};
+    return hs_parallel_visit(all->search, &filler, NULL, failure);
 }
 
 #define MOST_EXPECTED_KEPT (4 << 20) /* bytes; rows are kept when no more than these are expected */
@@ -205,59 +215,33 @@ keeps_all(const table *all)
            hs_account_allows(&search->call->account, 2.0 * MOST_KEPT);
 }
 
-/* One walk, by this thread, whose rows are kept. HS_TRY_OTHER: there were too many entries, and
- * none is kept. */
-static hs_status
-keep_all(table *all, hs_failure *failure)
-{
-    hs_search    *search = all->search;
-    const int64_t n = hs_search_asking(search)->n;
-    hs_walker     walker;
-    row_filler    fill = {.all = all};
-    memset(all->offsets, 0, (size_t)n * sizeof *all->offsets);
-    hs_output_reserve_hint(&all->kept, search->grid.expected_pairs * search->pairs_per_half);
-    hs_status status = hs_walker_init(search, hs_record_use(all->kept.columns), &all->most,
-                                      put_rows, &fill, &walker);
-    if (status == HS_OK) {
-        status = filler_open(all, &all->kept, walker.scanner.block.most_hits, &fill);
-    }
-    if (status == HS_OK) {
-        status = hs_walk(&walker, 0, (int32_t)n, failure);
-    }
-    close_filler(all, &fill);
-    hs_walker_close(search, &walker);
-    return status;
-}
-
 /* Sets the offsets. Where few entries are expected, one walk finds them, and keeps them. */
 static hs_status
 measure(table *all, hs_failure *failure)
 {
     hs_search    *search = all->search;
     hs_call      *call = search->call;
-    int64_t      *offsets = all->offsets, sum = 0;
+    int64_t      *offsets = all->offsets;
     const int64_t n = hs_search_asking(search)->n;
     hs_status     status = HS_TRY_OTHER;
     hs_output_init(&call->account, all->entries->ndim, all->entries->columns,
                    all->entries->index_bytes, &all->kept);
     if (keeps_all(all)) {
         const hs_stretch whole = hs_call_begin_part(call, PREPARED, 1.0);
-        status = keep_all(all, failure);
+        memset(offsets, 0, (size_t)(n + 1) * sizeof *offsets);
+        hs_output_reserve_hint(&all->kept, search->grid.expected_pairs * search->pairs_per_half);
+        status = walk_rows(all, failure); /* HS_TRY_OTHER: there are too many entries */
         call->part = whole;
     }
     if (status == HS_TRY_OTHER) {
         const hs_stretch whole = hs_call_begin_part(call, PREPARED, COUNTED);
         hs_output_free(&all->kept);
         all->kept.columns = 0;
-        status = hs_table_count(search, offsets, failure);
+        status = hs_table_count(search, offsets + 1, failure);
         call->part = whole;
     }
-    for (int64_t i = 0; i < n; i++) { /* from the number of each row's entries to its beginning */
-        const int64_t count = offsets[i];
-        offsets[i] = sum;
-        sum += count;
-    }
-    offsets[n] = sum;
+    offsets[0] = 0;
+    hs_starts_of_lengths(offsets, n + 1);
     return status;
 }
 
@@ -265,21 +249,14 @@ measure(table *all, hs_failure *failure)
 static hs_status
 fill(table *all, hs_failure *failure)
 {
-    const hs_bins   *asking = hs_search_asking(all->search);
-    const hs_visitor filler = {.use = hs_record_use(all->entries->columns),
-                               .most = &all->most,
-                               .visit = put_rows,
-                               .shared = all,
-                               .state_size = sizeof(row_filler),
-                               .open = open_filler,
-                               .close = close_filler};
+    const hs_bins *asking = hs_search_asking(all->search);
     if (all->kept.columns != 0) {
         hs_output_place(all->entries, all->offsets, &all->kept, asking->order, asking->n,
                         asking->n);
         return HS_OK;
     }
     const hs_stretch whole = hs_call_begin_part(all->search->call, COUNTED, 1.0);
-    const hs_status  status = hs_parallel_visit(all->search, &filler, NULL, failure);
+    const hs_status  status = walk_rows(all, failure);
     all->search->call->part = whole;
     return status;
 }

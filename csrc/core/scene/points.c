@@ -2,9 +2,6 @@
 #include "points.h"
 #include "../box/wrap.h"
 
-#include <math.h>
-#include <string.h>
-
 /* points.c: slabs of points are copied to columns, and the range of each column is kept. */
 
 /* Most bytes from one end of an array to the other: a little less than addresses allow, because the
@@ -62,10 +59,10 @@ entry_at(const hs_points *points, int64_t i, int k)
                       points->real);
 }
 
-/* Copies points [first, last). Inlined with constants for the type, ndim and column_stride. */
+/* Copies points [first, last). Inlined with constants for the type and ndim. */
 HS_ALWAYS_INLINE void
-copy_rows(const hs_points *points, const hs_real real, int ndim, ptrdiff_t column_stride,
-          int64_t first, int64_t last, double *const *x)
+copy_rows(const hs_points *points, const hs_real real, int ndim, int64_t first, int64_t last,
+          double *const *x)
 {
     double *to[HS_MAX_DIM];
     for (int k = 0; k < ndim; k++) {
@@ -74,7 +71,7 @@ copy_rows(const hs_points *points, const hs_real real, int ndim, ptrdiff_t colum
     for (int64_t i = first; i < last; i++) { /* no address behind the last point: it may overflow */
         const char *row = (const char *)points->data + i * points->row_stride;
         for (int k = 0; k < ndim; k++) {
-            to[k][i] = read_entry(row + k * column_stride, real);
+            to[k][i] = read_entry(row + k * points->column_stride, real);
         }
     }
 }
@@ -86,21 +83,14 @@ load_slab(void *context, int slab, int64_t first, int64_t last)
     const hs_points *points = load->points;
     double *const   *x = load->cloud->x;
     const int        d = points->ndim;
-    const ptrdiff_t  narrow = (ptrdiff_t)sizeof(float), wide = (ptrdiff_t)sizeof(double);
-    const ptrdiff_t  stride = points->column_stride;
     for (int64_t begin = first; begin < last; begin += TILE) {
         const int64_t end = last - begin < TILE ? last : begin + TILE;
-        /* The common shapes apart, so that their loops have no inner loop. */
-        if (points->real == HS_FLOAT64 && d == 3 && stride == wide) {
-            copy_rows(points, HS_FLOAT64, 3, wide, begin, end, x);
-        } else if (points->real == HS_FLOAT64 && d == 2 && stride == wide) {
-            copy_rows(points, HS_FLOAT64, 2, wide, begin, end, x);
-        } else if (points->real == HS_FLOAT64) {
-            copy_rows(points, HS_FLOAT64, d, stride, begin, end, x);
-        } else if (d == 3 && stride == narrow) {
-            copy_rows(points, HS_FLOAT32, 3, narrow, begin, end, x);
+        if (points->real == HS_FLOAT64 && d == 3) { /* most common: without an inner loop */
+            copy_rows(points, HS_FLOAT64, 3, begin, end, x);
+        } else if (points->real == HS_FLOAT64 && d == 2) {
+            copy_rows(points, HS_FLOAT64, 2, begin, end, x);
         } else {
-            copy_rows(points, HS_FLOAT32, d, stride, begin, end, x);
+            copy_rows(points, points->real, d, begin, end, x);
         }
         for (int k = 0; k < d; k++) {
             hs_range_widen(x[k] + begin, end - begin, &load->found[slab][k]);

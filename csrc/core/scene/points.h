@@ -2,9 +2,7 @@
 #ifndef HS_SCENE_POINTS_H
 #define HS_SCENE_POINTS_H
 
-#include "../memory/memory.h"
 #include "../threads/call.h"
-#include "../../kernels/kernel.h"
 
 /*
  * points.h: the only reader of the caller's coordinates. Each number is read once, so that a

@@ -1,13 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "scene.h"
 #include "../exact/arithmetic.h"
-#include "../threads/call.h"
 #include "../base/sort.h"
 #include "../base/status.h"
-#include "../base/os.h"
 
-#include <math.h>
-#include <string.h>
 #include <stdlib.h>
 
 /* scene.c: reads the points, closes gaps, scales, wraps, and sets bounds, in this order: how far
@@ -191,8 +187,6 @@ hs_scene_name_outlier(const hs_scene *scene, const hs_scene *asking, hs_failure 
         scene_name_farthest(scene, asking, failure);
     }
 }
-
-/* Points and queries in one scene, at once or one after the other: bounds must hold for both. */
 
 /* Queries that come later share the bounds of the points up to so many times their distance from
  * the box, and so many box vectors at least. Bounds that are so much wider cost next to nothing:
@@ -784,11 +778,8 @@ bring_near(hs_account *account, const hs_options *options, const hs_sets *sets, 
     return status;
 }
 
-/* The pass over all points that wraps them into the box, axis by axis where it can. */
-
 typedef struct wrapping {
     hs_scene     *scene;
-    bool          few_turns;
     hs_wrap_range folded[HS_SLABS];
 } wrapping;
 
@@ -852,8 +843,7 @@ move_slab(void *context, int slab, int64_t first, int64_t last)
         }
     }
     if (!lattice->aligned) {
-        hs_fold_points(lattice, wrap->few_turns, scaled, first, last, scene->cloud.x, turns,
-                       folded);
+        hs_fold_points(lattice, scaled, first, last, scene->cloud.x, turns, folded);
     }
     for (int k = 0; lattice->aligned && k < scene->ndim; k++) {
         const int row = lattice->row_of_axis[k];
@@ -932,8 +922,6 @@ wrap_points(hs_account *account, hs_team *team, const hs_options *options, hs_sc
     }
     if (is_periodic || scene->scale.exponent != 0) {
         wrap.scene = scene;
-        wrap.few_turns = !lattice->aligned &&
-                         hs_fold_turns(lattice, cloud->largest) <= HS_FOLD_TURNS;
         const int64_t n_slabs = (scene->n + HS_SLAB_POINTS - 1) / HS_SLAB_POINTS;
         for (int64_t slab = 0; slab < n_slabs && slab < HS_SLABS; slab++) {
             wrap.folded[slab] = folded;
@@ -1195,7 +1183,7 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
 {
     const size_t size = points->real == HS_FLOAT32 ? sizeof(float) : sizeof(double);
     const size_t row_size = size * (size_t)points->ndim;
-    void *const  rows = hs_store_reserve(&frame->store, HS_FOR_POINTS, points->n, row_size);
+    void *const  rows = hs_reserve(&frame->rows, HS_FOR_POINTS, points->n, row_size);
     if (rows == NULL) {
         frame->points.n = 0;
         return HS_ERR_MEMORY;
@@ -1207,9 +1195,7 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
                                 .row_stride = (ptrdiff_t)row_size,
                                 .column_stride = (ptrdiff_t)size};
     frame->has_box = box != NULL;
-    if (box != NULL) {
-        frame->box = *box;
-    }
+    frame->box = box != NULL ? *box : (hs_box){.ndim = points->ndim};
     enum { TILE = 512 };
     const int64_t d = points->ndim;
     const bool    packed = (points->column_stride == (ptrdiff_t)size || d == 1) &&
@@ -1250,20 +1236,13 @@ hs_frame_take(const hs_points *points, const hs_box *box, const hs_options *opti
     return HS_OK;
 }
 
-/* Whether box vector l repeats. */
-static bool
-frame_repeats(const hs_frame *frame, int l)
-{
-    return frame->has_box && frame->box.periodic[l];
-}
-
 bool
 hs_frames_match(const hs_frame *one, const hs_frame *other)
 {
     bool match = one->points.n == other->points.n && one->points.ndim == other->points.ndim &&
                  one->points.real == other->points.real;
     for (int l = 0; l < one->points.ndim; l++) {
-        match = match && frame_repeats(one, l) == frame_repeats(other, l);
+        match = match && one->box.periodic[l] == other->box.periodic[l];
     }
     return match;
 }
@@ -1272,7 +1251,7 @@ bool
 hs_frames_share_box(const hs_frame *one, const hs_frame *other)
 {
     for (int l = 0; l < one->points.ndim; l++) {
-        for (int k = 0; frame_repeats(one, l) && k < one->points.ndim; k++) {
+        for (int k = 0; one->box.periodic[l] && k < one->points.ndim; k++) {
             if (one->box.rows[l][k] != other->box.rows[l][k]) {
                 return false;
             }
@@ -1284,6 +1263,7 @@ hs_frames_share_box(const hs_frame *one, const hs_frame *other)
 void
 hs_frame_free(hs_frame *frame)
 {
-    hs_store_free(&frame->store);
+    hs_free(NULL, frame->rows);
+    frame->rows = NULL;
     frame->points.data = NULL;
 }

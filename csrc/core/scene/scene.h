@@ -2,9 +2,7 @@
 #ifndef HS_SCENE_SCENE_H
 #define HS_SCENE_SCENE_H
 
-#include "../exact/metric.h"
 #include "../box/wrap.h"
-#include "../memory/memory.h"
 #include "points.h"
 
 /*
@@ -186,11 +184,11 @@ hs_box_size hs_box_size_of(const hs_box *box);
  * outlives the call (pair_list.h) compares and decides with. */
 
 typedef struct hs_frame {
-    hs_points points; /* in the store: one point behind another, of the caller's type */
-    hs_store  store;
+    void     *rows;    /* owned: one point behind another, of the caller's type */
+    hs_points points;  /* these */
     double    largest; /* largest |x| of all coordinates, 0 without points */
     bool      has_box;
-    hs_box    box;
+    hs_box    box; /* without one nothing repeats */
 } hs_frame;
 
 /*
@@ -228,7 +226,7 @@ HS_ALWAYS_INLINE int
 hs_frame_periodic(const hs_frame *frame, int *vector_of_row)
 {
     int m = 0;
-    for (int l = 0; frame->has_box && l < frame->box.ndim; l++) {
+    for (int l = 0; l < frame->box.ndim; l++) {
         if (frame->box.periodic[l]) {
             vector_of_row[m++] = l;
         }

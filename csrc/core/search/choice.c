@@ -2,8 +2,6 @@
 #include "choice.h"
 #include "../base/sort.h"
 
-#include <string.h>
-
 /* choice.c: what the caller selects is checked; points, box and labels are kept where they are
  * needed. */
 
@@ -491,7 +489,7 @@ hs_choose(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t next)
         float out = INFINITY; /* squares beyond this are at least the least distance apart */
         if (!search->scene.extreme) {
             out = hs_thresholds_of(search->scene.ndim, hs_choice_least(choice, &search->scene),
-                                   scanner->form->extent, search->filter_error)
+                                   scanner->form.extent, search->filter_error)
                       .out;
         }
         scan->n_unsure = 0;

@@ -2,13 +2,7 @@
 #ifndef HS_SEARCH_CHOICE_H
 #define HS_SEARCH_CHOICE_H
 
-#include "../../halfshell.h"
-#include "../box/wrap.h"
-#include "../scene/scene.h"
-#include "../threads/call.h"
 #include "scan.h"
-
-#include <math.h>
 
 /*
  * choice.h: which pairs count, of those within reach: the caller's selection made ready for one
@@ -113,8 +107,6 @@ hs_choice_least(const hs_choice *choice, const hs_scene *scene)
     return scene->extreme ? choice->min_distance
                           : hs_scale_apply(scene->scale, choice->min_distance);
 }
-
-/* Takes pairs that do not count from the hits of a scan, before anything is done with them. */
 
 /*
  * Takes hits of points [first, next) of the group out that the call's choice leaves out; the order

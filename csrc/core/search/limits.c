@@ -2,8 +2,6 @@
 #include "limits.h"
 #include "../base/status.h"
 
-#include <math.h>
-
 /* limits.c: what a scan compares with is laid out beside the candidates, so that kernels read it as
  * they read coordinates. */
 
@@ -25,18 +23,52 @@ number_of(const hs_scanner *scanner, int32_t c)
     return block->number[scanner->is_ordered ? block->origin[c] : c];
 }
 
+/* The supports of the group and the block. */
+static void
+set_supports(const hs_scanner *scanner, hs_scan *scan)
+{
+    const hs_supports *supports = scanner->search->limits->supports;
+    const int64_t      first = scanner->group.first;
+    const hs_block    *block = &scanner->block;
+    const int          n_numbers = hs_support_numbers(scan->ndim);
+    const float       *asking = supports->of_asking.near, *points = supports->of_points.near;
+    scan->supports = (hs_support_scan){
+        .rule = supports->rule,
+        .form = scanner->form.limits,
+        .of_point = asking != NULL ? asking + first * n_numbers : NULL,
+        .of_block = block->radius,
+        .pitch = block->pitch,
+    };
+    if (!supports->is_bounded) {
+        scan->direct.in = INFINITY; /* no support reaches that far */
+    }
+    for (int32_t c = 0; points != NULL && c < block->n; c++) { /* a row for each number */
+        const float *numbers = points + (int64_t)number_of(scanner, c) * n_numbers;
+        for (int e = 0; e < n_numbers; e++) {
+            block->radius[e * block->pitch + c] = numbers[e];
+        }
+    }
+    for (int e = 0; points != NULL && e < n_numbers; e++) {
+        hs_pad_lanes(block->radius + e * block->pitch, block->n);
+    }
+}
+
 void
-hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_scan *scan)
+hs_limits_set(const hs_scanner *scanner, hs_scan *scan)
 {
     const hs_limits      *limits = scanner->search->limits;
     const hs_limit_table *table = &limits->table;
     const float          *of_asking = limits->of_asking.near, *of_points = limits->of_points.near;
     const hs_block       *block = &scanner->block;
     const bool            has_table = table->near != NULL;
-    *scan = (hs_limit_scan){
+    if (limits->supports != NULL) {
+        set_supports(scanner, scan);
+        return;
+    }
+    scan->limits = (hs_limit_scan){
         .rule = limits->rule,
         .bound = limits->near_bound,
-        .form = *form,
+        .form = scanner->form.limits,
         .of_point = of_asking != NULL ? of_asking + scanner->group.first : NULL,
         .of_block = of_points != NULL || has_table ? block->radius : NULL,
         .row = has_table ? table->of_asking + scanner->group.first : NULL,
@@ -96,35 +128,6 @@ hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end, int
             to[e] = fits ? (float)(numbers[e] * times) : 0.0f;
         }
         to[n] = fits ? (float)(size * UPWARDS) : INFINITY;
-    }
-}
-
-void
-hs_supports_set(const hs_scanner *scanner, hs_scan *scan)
-{
-    const hs_supports *supports = scanner->search->limits->supports;
-    const int64_t      first = scanner->group.first;
-    const hs_block    *block = &scanner->block;
-    const int          n_numbers = hs_support_numbers(scan->ndim);
-    const float       *asking = supports->of_asking.near, *points = supports->of_points.near;
-    scan->supports = (hs_support_scan){
-        .rule = supports->rule,
-        .form = scanner->form->limits,
-        .of_point = asking != NULL ? asking + first * n_numbers : NULL,
-        .of_block = block->radius,
-        .pitch = block->pitch,
-    };
-    if (!supports->is_bounded) {
-        scan->direct.in = INFINITY; /* no support reaches that far */
-    }
-    for (int32_t c = 0; points != NULL && c < block->n; c++) { /* a row for each number */
-        const float *numbers = points + (int64_t)number_of(scanner, c) * n_numbers;
-        for (int e = 0; e < n_numbers; e++) {
-            block->radius[e * block->pitch + c] = numbers[e];
-        }
-    }
-    for (int e = 0; points != NULL && e < n_numbers; e++) {
-        hs_pad_lanes(block->radius + e * block->pitch, block->n);
     }
 }
 
@@ -189,12 +192,21 @@ decide_pair(hs_scanner *scanner, const double *const *numbers, const hs_span *sp
     return all == HS_WITHIN;
 }
 
-void
-hs_supports_decide(hs_scanner *scanner, uint8_t *within)
+/* Whether each pair of the batch is within its supports, and within the cutoff where these reach
+ * further. Supports of no extent hold nothing but D = 0. */
+static void
+decide_by_supports(hs_scanner *scanner, uint8_t *within)
 {
     const hs_supports   *supports = scanner->search->limits->supports;
     const hs_pair_batch *pair_batch = &scanner->pair_batch;
     const int            n_entries = hs_support_entries(scanner->search->scene.ndim);
+    hs_metric            ball = scanner->search->scene.metric;
+    uint8_t              in_ball[HS_BATCH];
+    if (supports->metric.limit.cutoff == 0.0) {
+        hs_metric_set_cutoff(0.0, &ball);
+        hs_decide_pair_batch(scanner, &ball, within);
+        return;
+    }
     for (int32_t e = 0; e < pair_batch->n; e++) {
         double        p[HS_MAX_DIM], q[HS_MAX_DIM];
         int64_t       shift[HS_MAX_DIM];
@@ -206,5 +218,57 @@ hs_supports_decide(hs_scanner *scanner, uint8_t *within)
             hs_rule_needs_other(supports->rule) ? support_of(&supports->of_points, sj, n_entries)
                                                 : NULL};
         within[e] = decide_pair(scanner, numbers, &span);
+    }
+    if (supports->is_bounded) {
+        const hs_stages counted = scanner->stages;
+        hs_decide_pair_batch(scanner, &ball, in_ball);
+        scanner->stages = counted; /* a pair counts once */
+        for (int32_t e = 0; e < pair_batch->n; e++) {
+            within[e] = within[e] && in_ball[e];
+        }
+    }
+}
+
+/* Pairs whose limits are one number, as for points of one size in a crystal, are decided at
+ * once. */
+void
+hs_limits_decide(hs_scanner *scanner, uint8_t *within)
+{
+    const hs_limits     *of_search = scanner->search->limits;
+    const hs_pair_batch *pair_batch = &scanner->pair_batch;
+    const hs_precision   precision = scanner->options.precision;
+    const int32_t        n = pair_batch->n;
+    hs_metric            metric = scanner->search->scene.metric;
+    hs_dw                limits[HS_BATCH];
+    bool                 is_one = precision != HS_SINGLE;
+    if (of_search->supports != NULL) {
+        decide_by_supports(scanner, within);
+        return;
+    }
+    for (int32_t e = 0; e < n; e++) {
+        limits[e] =
+            hs_limit_of(of_search, pair_batch->si[e], scanner->block.number[pair_batch->place[e]]);
+        is_one = is_one && limits[e].hi == limits[0].hi && limits[e].hi >= 0.0 &&
+                 limits[e].lo == 0.0;
+    }
+    if (is_one) {
+        hs_metric_set_cutoff(limits[0].hi, &metric);
+        hs_decide_pair_batch(scanner, &metric, within);
+        return;
+    }
+    for (int32_t e = 0; e < n; e++) {
+        double         p[HS_MAX_DIM], q[HS_MAX_DIM];
+        int64_t        of_pair[HS_MAX_DIM];
+        const int64_t *shift = hs_pair_batch_pair(pair_batch, e, p, q, of_pair);
+        if (limits[e].hi < 0.0) {
+            within[e] = false;
+        } else if (precision == HS_SINGLE) { /* its square is that of the limit */
+            within[e] = scanner->options.inclusive;
+        } else if (precision == HS_DOUBLE) {
+            hs_metric_set_cutoff(limits[e].hi, &metric);
+            within[e] = hs_metric_within_double(&metric, p, q, shift);
+        } else {
+            within[e] = hs_metric_within_sum(&metric, limits[e], p, q, shift, &scanner->stages);
+        }
     }
 }

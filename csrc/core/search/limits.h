@@ -45,9 +45,13 @@ typedef struct hs_limits {
 /* Numbers that scans need of each candidate, for a search that has limits. */
 int32_t hs_limits_rows(const hs_search *search);
 
-/* The radii of the present group and block, or what a table has in their place, for a scan with
- * thresholds of this form. */
-void hs_limits_set(const hs_scanner *scanner, const hs_limit_form *form, hs_limit_scan *scan);
+/* The radii or supports of the present group and block, or what a table has in their place, for a
+ * scan. */
+void hs_limits_set(const hs_scanner *scanner, hs_scan *scan);
+
+/* Whether each pair of the scanner's batch is within what it is compared with. within: HS_BATCH of
+ * them. */
+void hs_limits_decide(hs_scanner *scanner, uint8_t *within);
 
 /* The length that a pair is compared with, for the radii of the asking point and of the other one:
  * exactly, hi being the nearest float64. With HS_RULE_MEAN radii are halved already; rules of sums
@@ -84,15 +88,6 @@ hs_limit_of(const hs_limits *limits, int32_t si, int32_t sj)
                        points != NULL ? points[sj] : 0.0, limits->bound);
 }
 
-/* The limit of pair e of the scanner's batch. */
-HS_ALWAYS_INLINE hs_dw
-hs_limit_of_pair(const hs_scanner *scanner, int32_t e)
-{
-    const hs_pair_batch *pair_batch = &scanner->pair_batch;
-    return hs_limit_of(scanner->search->limits, pair_batch->si[e],
-                       scanner->block.number[pair_batch->place[e]]);
-}
-
 /*
  * Pairs that are decided by the supports of their points (ellipsoid.h), and not by a length. The
  * search is one for the longest distance that supports reach, and scans compare in float32 with a
@@ -120,12 +115,5 @@ typedef struct hs_supports {
  * cells; its own `near` is not looked at. near: end * hs_support_numbers(ndim). */
 void hs_supports_lay_out(const hs_support_side *side, int64_t first, int64_t end, int ndim,
                          double extent, double unscale, float *near);
-
-/* The supports of the group and the block, for a scan. */
-void hs_supports_set(const hs_scanner *scanner, hs_scan *scan);
-
-/* Whether each pair of the pair batch is within the supports, by the rule, however far apart it is;
- * not for an extent of 0. within: HS_BATCH of them. */
-void hs_supports_decide(hs_scanner *scanner, uint8_t *within);
 
 #endif

@@ -1,16 +1,9 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "scan.h"
-#include "../base/os.h"
 #include "../base/sort.h"
-#include "../memory/memory.h"
 #include "limits.h"
 #include "choice.h"
-#include "../exact/metric.h"
 #include "../base/status.h"
-
-#include <math.h>
-#include <string.h>
-#include <stddef.h>
 
 /* scan.c: a block is gathered, scanned for some points at a time, and what they hit is decided.
  * Candidates are appended as runs of point numbers; then the kernel copies all runs at once. */
@@ -96,29 +89,26 @@ group_load(const hs_bins *bins, hs_group *group)
     }
 }
 
-/* Sorts the runs by one component of S, stable: by its lower 32 bits, or by the bits above. */
-static void
-sort_by_shift(int32_t n_runs, const int64_t *shifts, bool upper, hs_order *order)
+/* Sorts the runs by component l of S, stable. What lies in `origin` is lost. */
+static hs_status
+sort_by_shift(const hs_options *options, int l, hs_block *block)
 {
-    int32_t *run = order->run;
-    int64_t  least = INT64_MAX;
-    uint32_t any = 0;
-    for (int32_t r = 0; r < n_runs; r++) {
+    const hs_order *order = &block->order;
+    const int64_t  *shifts = order->shifts + l;
+    int64_t         least = INT64_MAX;
+    hs_keys         sort = {.keys = (int64_t *)order->entries,
+                            .ids = order->run,
+                            .spare_keys = (int64_t *)order->spare,
+                            .spare_ids = block->origin,
+                            .options = options};
+    for (int32_t r = 0; r < block->n_runs; r++) {
         const int64_t shift = shifts[(int64_t)r * HS_MAX_DIM];
         least = shift < least ? shift : least;
     }
-    for (int32_t e = 0; e < n_runs; e++) {
-        const uint64_t above = (uint64_t)shifts[(int64_t)run[e] * HS_MAX_DIM] - (uint64_t)least;
-        const uint32_t key = upper ? (uint32_t)(above >> 32) : (uint32_t)above;
-        order->entries[e] = (uint64_t)key << 32 | (uint32_t)run[e];
-        any |= key;
+    for (int32_t e = 0; e < block->n_runs; e++) { /* less than 2^63 apart (hs_lattice_shift) */
+        sort.keys[e] = shifts[(int64_t)order->run[e] * HS_MAX_DIM] - least;
     }
-    if (any != 0) {
-        hs_sort_numbers(order->entries, n_runs, 32, order->spare);
-        for (int32_t e = 0; e < n_runs; e++) {
-            run[e] = (int32_t)(order->entries[e] & UINT32_MAX);
-        }
-    }
+    return hs_keys_sort(&sort, 0, block->n_runs);
 }
 
 /* Polls between passes over a large block. */
@@ -171,9 +161,7 @@ order_block(hs_scanner *scanner)
         }
     }
     for (int l = lattice->n_periodic - 1; by_shift && l >= 0; l--) {
-        sort_by_shift(block->n_runs, order->shifts + l, false, order);
-        sort_by_shift(block->n_runs, order->shifts + l, true, order);
-        if (poll_large(options, block) != HS_OK) {
+        if (sort_by_shift(options, l, block) != HS_OK || poll_large(options, block) != HS_OK) {
             return HS_ERR_INTERRUPTED;
         }
     }
@@ -542,8 +530,6 @@ hs_pair_batch_pair(const hs_pair_batch *pair_batch, int32_t e, double *p, double
     return shift;
 }
 
-/* Thresholds for rounded extents, so that there are few of them, each computed once. */
-
 /* Candidates from which on those are left out that are far from the whole group: with fewer that
  * costs what it saves. Fewer will do for a group whose pairs reach less far than the cutoff. */
 #ifdef HS_TESTING
@@ -557,10 +543,10 @@ hs_pair_batch_pair(const hs_pair_batch *pair_batch, int32_t e, double *p, double
 #define EXTENT_SHIFT 18   /* bits of the mantissa that extents do without */
 
 /* The form for |y_k| and |q_k| up to the float >= 0 of these bits, rounded up to the top five bits
- * of its mantissa, which adds 1/32 at most; NaN and infinity remain. It was set for this extent,
- * which NaN never is, and for all else that differs between the searches of a walker. */
-static const hs_form *
-form_of(hs_scanner *scanner, uint32_t bits)
+ * of its mantissa, which adds 1/32 at most; NaN and infinity remain. So there are few extents, and
+ * what a consumer needs of each can be computed once. */
+static hs_form
+form_of(const hs_scanner *scanner, uint32_t bits)
 {
     const hs_scene  *scene = &scanner->search->scene;
     const hs_limits *limits = scanner->search->limits;
@@ -571,35 +557,26 @@ form_of(hs_scanner *scanner, uint32_t bits)
     const double     error = scanner->search->filter_error;
     const double     low = scene->cutoff_low; /* a scaled cutoff may be known between bounds only */
     const int        d = scene->ndim;
-    hs_form         *form = &scanner->forms[(rounded >> EXTENT_SHIFT) % HS_FORMS];
-    if (form->extent == extent && form->cutoff == scene->cutoff && form->error == error &&
-        form->cutoff_low == low && form->is_extreme == scene->extreme) {
-        return form;
-    }
-    form->extent = extent;
-    form->cutoff = scene->cutoff;
-    form->cutoff_low = low;
-    form->error = error;
-    form->is_extreme = scene->extreme;
-    form->kind = by_supports ? HS_SCAN_SUPPORTS : limits != NULL ? HS_SCAN_LIMITS : HS_SCAN_DIRECT;
+    hs_form          form = {.extent = extent};
+    form.kind = by_supports ? HS_SCAN_SUPPORTS : limits != NULL ? HS_SCAN_LIMITS : HS_SCAN_DIRECT;
     /* Supports are decided alike in all precisions: what the filter leaves, by a fixed formula. */
     if (scanner->options.precision == HS_SINGLE && !by_supports) {
         const float square = (float)(scene->cutoff * scene->cutoff);
-        form->direct.out = scanner->options.inclusive ? square : nextafterf(square, -1.0f);
-        form->direct.in = INFINITY; /* one float32 comparison: no hit is unsure */
-        form->limits = (hs_limit_form){1.0f, 0.0f, 1.0f, 0.0f};
+        form.direct.out = scanner->options.inclusive ? square : nextafterf(square, -1.0f);
+        form.direct.in = INFINITY; /* one float32 comparison: no hit is unsure */
+        form.limits = (hs_limit_form){1.0f, 0.0f, 1.0f, 0.0f};
         return form;
     }
-    form->direct = hs_thresholds_of(d, scene->cutoff, extent, error);
+    form.direct = hs_thresholds_of(d, scene->cutoff, extent, error);
     if (scene->extreme) {
-        form->direct.in = low > 0.0 ? hs_thresholds_of(d, low, extent, error).in : -1.0f;
+        form.direct.in = low > 0.0 ? hs_thresholds_of(d, low, extent, error).in : -1.0f;
     }
     if (by_supports) {
-        form->limits = hs_support_form_of(d, extent, error);
+        form.limits = hs_support_form_of(d, extent, error);
     } else if (limits != NULL) {
-        form->limits = hs_limit_form_of(d, extent, error);
+        form.limits = hs_limit_form_of(d, extent, error);
     } else if (scanner->scans == HS_BLOCK_LISTS_SQUARES) {
-        form->kind = HS_SCAN_SQUARES;
+        form.kind = HS_SCAN_SQUARES;
     }
     return form;
 }
@@ -645,10 +622,11 @@ form_prune(hs_scanner *scanner)
     const float  half = (float)(0.5 * extent * (1.0 + 0x1p-23)); /* no less, when rounded */
     /* Otherwise y might not be a float. Own points are kept whatever the threshold is. */
     if (half < 0x1p100f) {
-        const hs_form *form = form_of(scanner, hs_bits_of_float(half));
-        const float    out =
-            is_shorter ? hs_thresholds_of(search->scene.ndim, cutoff, form->extent, error).out
-                          : form->direct.out;
+        const hs_form form = form_of(scanner, hs_bits_of_float(half));
+        float         out = form.direct.out;
+        if (is_shorter) {
+            out = hs_thresholds_of(search->scene.ndim, cutoff, form.extent, error).out;
+        }
         group->near.out = fmaxf(out, 0.0f);
     }
 }
@@ -676,9 +654,6 @@ hs_scanner_init(hs_search *search, hs_block_use use, int32_t capacity, int32_t m
                 bool is_ordered, hs_scanner *scanner)
 {
     begin(search, use, is_ordered, scanner);
-    for (int f = 0; f < HS_FORMS; f++) { /* none is known yet */
-        scanner->forms[f].extent = -1.0;
-    }
     scanner->pair_batch.memory = NULL; /* freed also when never set */
     const hs_status status = block_init(scanner, capacity, most_runs);
     return status == HS_OK ? pair_batch_init(scanner, &scanner->pair_batch) : status;
@@ -809,76 +784,12 @@ hs_decide_pair_batch(hs_scanner *scanner, const hs_metric *metric, uint8_t *with
     }
 }
 
-/* Whether each pair of the batch is within its own limit. Where that is one number, as for points
- * of one size in a crystal, they are decided together. */
-static void
-decide_by_limits(hs_scanner *scanner, uint8_t *within)
-{
-    const hs_precision precision = scanner->options.precision;
-    const int32_t      n = scanner->pair_batch.n;
-    hs_metric          metric = scanner->search->scene.metric;
-    hs_dw              limits[HS_BATCH];
-    bool               is_one = precision != HS_SINGLE;
-    for (int32_t e = 0; e < n; e++) {
-        limits[e] = hs_limit_of_pair(scanner, e);
-        is_one = is_one && limits[e].hi == limits[0].hi && limits[e].hi >= 0.0 &&
-                 limits[e].lo == 0.0;
-    }
-    if (is_one) {
-        hs_metric_set_cutoff(limits[0].hi, &metric);
-        hs_decide_pair_batch(scanner, &metric, within);
-        return;
-    }
-    for (int32_t e = 0; e < n; e++) {
-        double         p[HS_MAX_DIM], q[HS_MAX_DIM];
-        int64_t        of_pair[HS_MAX_DIM];
-        const int64_t *shift = hs_pair_batch_pair(&scanner->pair_batch, e, p, q, of_pair);
-        if (limits[e].hi < 0.0) {
-            within[e] = false;
-        } else if (precision == HS_SINGLE) { /* its square is that of the limit */
-            within[e] = scanner->options.inclusive;
-        } else if (precision == HS_DOUBLE) {
-            hs_metric_set_cutoff(limits[e].hi, &metric);
-            within[e] = hs_metric_within_double(&metric, p, q, shift);
-        } else {
-            within[e] = hs_metric_within_sum(&metric, limits[e], p, q, shift, &scanner->stages);
-        }
-    }
-}
-
-/* Whether each pair of the batch is within its supports, and within the cutoff where these reach
- * further. Supports of no extent hold nothing but D = 0. */
-static void
-decide_by_supports(hs_scanner *scanner, uint8_t *within)
-{
-    const hs_supports *supports = scanner->search->limits->supports;
-    hs_metric          ball = scanner->search->scene.metric;
-    uint8_t            in_ball[HS_BATCH];
-    if (supports->metric.limit.cutoff == 0.0) {
-        hs_metric_set_cutoff(0.0, &ball);
-        hs_decide_pair_batch(scanner, &ball, within);
-        return;
-    }
-    hs_supports_decide(scanner, within);
-    if (supports->is_bounded) {
-        const hs_stages counted = scanner->stages;
-        hs_decide_pair_batch(scanner, &ball, in_ball);
-        scanner->stages = counted; /* a pair counts once */
-        for (int32_t e = 0; e < scanner->pair_batch.n; e++) {
-            within[e] = within[e] && in_ball[e];
-        }
-    }
-}
-
 /* A hs_decide_fn: whether pairs are within what they are compared with. */
 static hs_status
 decide_within(hs_scanner *scanner, uint8_t *within)
 {
-    const hs_limits *limits = scanner->search->limits;
-    if (limits != NULL && limits->supports != NULL) {
-        decide_by_supports(scanner, within);
-    } else if (limits != NULL) {
-        decide_by_limits(scanner, within);
+    if (scanner->search->limits != NULL) {
+        hs_limits_decide(scanner, within);
     } else {
         hs_decide_pair_batch(scanner, &scanner->search->scene.metric, within);
     }
@@ -929,10 +840,9 @@ hs_scanner_decide(hs_scanner *scanner, hs_scan *scan, int32_t first, int32_t nex
 static void
 set_scan(const hs_scanner *scanner, hs_scan *scan)
 {
-    const hs_limits *limits = scanner->search->limits;
-    const hs_block  *block = &scanner->block;
-    const bool       lists_places = scanner->scans == HS_BLOCK_LISTS_PLACES;
-    scan->form = scanner->form->kind;
+    const hs_block *block = &scanner->block;
+    const bool      lists_places = scanner->scans == HS_BLOCK_LISTS_PLACES;
+    scan->form = scanner->form.kind;
     scan->counts = scanner->scans == HS_BLOCK_COUNTS;
     scan->ndim = scanner->search->scene.ndim;
     for (int k = 0; k < scan->ndim; k++) {
@@ -945,12 +855,10 @@ set_scan(const hs_scanner *scanner, hs_scan *scan)
     scan->n = block->n;
     scan->n_points = scanner->group.last - scanner->group.first;
     scan->triangular = scanner->block_is_first;
-    scan->direct = scanner->form->direct;
+    scan->direct = scanner->form.direct;
     scan->hits = block->hits;
-    if (limits != NULL && limits->supports != NULL) {
-        hs_supports_set(scanner, scan);
-    } else if (limits != NULL) {
-        hs_limits_set(scanner, &scanner->form->limits, &scan->limits);
+    if (scanner->search->limits != NULL) {
+        hs_limits_set(scanner, scan);
     }
     scan->squares = block->squares;
     scan->unsure = block->unsure;

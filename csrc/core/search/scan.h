@@ -2,7 +2,6 @@
 #ifndef HS_SEARCH_SCAN_H
 #define HS_SEARCH_SCAN_H
 
-#include "../../kernels/kernel.h"
 #include "search.h"
 
 /*
@@ -158,23 +157,18 @@ typedef struct hs_neighbourhood {
     int64_t candidates, runs;
 } hs_neighbourhood;
 
-/* How blocks of one extent are scanned, in a search of such a cutoff and error. */
+/* How a block is scanned. */
 typedef struct hs_form {
-    double        extent; /* a bound on |y_k| of the block plus |q_k| of the group; -1: not set */
-    double        cutoff, cutoff_low, error;
-    bool          is_extreme;
+    double        extent; /* a bound on |y_k| of the block plus |q_k| of the group */
     hs_scan_form  kind;
     hs_thresholds direct;
     hs_limit_form limits; /* for pairs with limits of their own */
 } hs_form;
 
-/* Forms that a scanner keeps: those of half a binary order. */
-#define HS_FORMS 16
-
 /* Belongs to one thread. */
 struct hs_scanner {
     /* Large, and filled before they are read: not cleared at first. */
-    hs_form       forms[HS_FORMS]; /* by the last bits of the extent */
+    hs_form       form; /* of the present group and block */
     hs_group      group;
     hs_block      block;
     hs_pair_batch pair_batch;
@@ -187,7 +181,6 @@ struct hs_scanner {
     bool             is_ordered; /* candidates are put in order before they are tested */
     hs_visit_fn      visit;      /* NULL when counting */
     void            *visit_context;
-    const hs_form   *form;        /* of the present group and block */
     int64_t          n_subnormal; /* blocks in which subnormal numbers were met */
     bool             flushes;     /* too many: only gathering and scanning flush them from now on */
     bool             block_is_first; /* of its group: candidate t is group point t; half lists */

@@ -4,10 +4,6 @@
 #include "walk.h"
 #include "choice.h"
 
-#include <math.h>
-#include <string.h>
-#include <stddef.h>
-
 /* search.c: begins a search, sets what follows from its parts, and frees them; and says how many
  * pairs to expect: by the density of the points, then by counting the neighbours of a sample. */
 
@@ -226,14 +222,14 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     const double bound = most * bytes_per_pair;
     const double by_density = search->grid.expected_pairs * search->pairs_per_half;
     const bool   is_uneven = search->is_sparse || hs_search_crowd(search) > EVEN;
-    const bool   is_large = bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
+    const bool   foresees = is_uneven && bytes_per_pair > BYTES_OF_INDICES && bound > LARGE_RESULT;
     sample       taken;
     /* The limit is looked up, which takes longer than a sample, unless the result may be too large
      * to do without and does not seem to be. */
     const bool samples_first = account->find_limit != NULL && bound > HS_LIMIT_FREE &&
                                by_density * bytes_per_pair < SEEMS_SMALL * HS_LIMIT_FREE;
-    if (n == 0 ||
-        (!samples_first && !(is_large && is_uneven) && hs_account_allows(account, bound))) {
+    const bool fits = n == 0 || (!samples_first && hs_account_allows(account, bound));
+    if (fits && !foresees) {
         return HS_OK;
     }
     const hs_status status = take_sample(search, SAMPLES, 1, &taken);
@@ -242,10 +238,10 @@ hs_estimate_by_sample(hs_search *search, hs_failure *failure)
     }
     const double many = (double)taken.taken;
     const double mean = taken.sum / many;
-    if (is_large && is_uneven && !taken.is_cut) { /* as many are foreseen as there are */
+    if (foresees && !taken.is_cut) { /* as many are foreseen as there are */
         search->grid.expected_pairs = mean * (double)n / search->pairs_per_half;
     }
-    if (!samples_first && hs_account_allows(account, bound)) {
+    if (fits) {
         return HS_OK;
     }
     const double variance = fmax(0.0, taken.squares / many - mean * mean);
@@ -419,7 +415,7 @@ hs_search_halve(hs_search *search)
     search->is_full = false;
     search->is_half = true;
     search->pairs_per_half = 1.0;
-    hs_stencil_free(&call->account, &search->stencil);
+    hs_free(&call->account, search->stencil.rows);
     return hs_stencil_build(&call->account, &call->options, &search->scene, &search->grid, false,
                             &search->stencil);
 }
@@ -428,8 +424,9 @@ void
 hs_search_close(hs_search *search)
 {
     hs_account *account = &search->call->account;
-    hs_stencil_free(account, &search->stencil);
+    hs_free(account, search->stencil.rows);
     hs_free(account, search->shells.memory);
+    search->stencil.rows = NULL;
     search->shells.memory = NULL;
     if (!search->is_borrowed) {
         hs_scene_free(account, &search->scene);
@@ -439,8 +436,6 @@ hs_search_close(hs_search *search)
         hs_bins_free(account, &search->query_bins);
     }
 }
-
-/* The scene first, then the grid, its stencil, and the points sorted into its cells. */
 
 /*
  * Chooses the grid. HS_ALL_PAIRS and HS_HASH say which. Else it is the dense one, with cells as
@@ -490,12 +485,9 @@ build_bins(hs_search *search, bool of_queries, hs_scene *scene)
 {
     hs_call *call = search->call;
     hs_grid  counted = search->grid; /* occupied cells of queries are counted by themselves */
-    hs_grid *grid = of_queries ? &counted : &search->grid;
-    hs_bins *bins = of_queries ? &search->query_bins : &search->bins;
-    return search->is_sparse
-               ? hs_sparse_build(&call->account, call->team, &call->options, scene, grid, bins)
-               : hs_bins_build(&call->account, call->team, &call->options, scene, grid, of_queries,
-                               bins);
+    return hs_bins_build(&call->account, call->team, &call->options, scene,
+                         of_queries ? &counted : &search->grid, of_queries,
+                         of_queries ? &search->query_bins : &search->bins);
 }
 
 /* What a grid, chosen or narrowed, is followed by: bounds, an estimate, and the stencil. */
@@ -550,8 +542,6 @@ hs_search_build(const hs_sets *sets, const hs_box *box, hs_search *search, hs_fa
     }
     return status;
 }
-
-/* A copy of the other search that borrows its arrays, with a reach and queries of its own. */
 
 /* Scaled cutoffs as small as this keep all their digits. */
 #define SMALLEST_CUTOFF 0x1p-500
@@ -625,8 +615,6 @@ hs_search_reuse(const hs_sets *sets, hs_call *call, hs_search *search, hs_failur
     return status;
 }
 
-/* Takes cells that were kept where they serve, and else makes new ones. */
-
 hs_status
 hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search *search,
                hs_failure *failure)
@@ -640,20 +628,16 @@ hs_search_open(const hs_sets *sets, const hs_box *box, hs_call *call, hs_search 
         hs_search_begin(call, search);
         hs_call_gather(call, sets->points->n + n_queries);
         status = hs_search_build(sets, box, search, failure);
-        if (status != HS_OK) {
-            hs_search_close(search);
-        }
     }
     if (status == HS_OK && (call->options.want & HS_WANT_SHELL)) {
         status = hs_shells_open(&call->account, &search->scene, &call->options, &search->shells);
-        if (status != HS_OK) {
-            hs_search_close(search);
-        }
     }
-    if (status == HS_OK) { /* threads for the walk, where points alone were not worth them */
-        hs_call_gather_for(call, hs_search_asking(search)->n,
-                           search->grid.expected_pairs * search->pairs_per_half,
-                           search->is_borrowed);
+    if (status != HS_OK) {
+        hs_search_close(search);
+        return status;
     }
-    return status;
+    /* Threads for the walk, where points alone were not worth them. */
+    hs_call_gather_for(call, hs_search_asking(search)->n,
+                       search->grid.expected_pairs * search->pairs_per_half, search->is_borrowed);
+    return HS_OK;
 }

@@ -2,10 +2,7 @@
 #ifndef HS_SEARCH_SEARCH_H
 #define HS_SEARCH_SEARCH_H
 
-#include "../scene/scene.h"
 #include "../cells/bins.h"
-#include "../cells/grid.h"
-#include "../threads/call.h"
 
 /*
  * search.h: one scene made ready for a call: points in cell order and the neighbouring rows of
@@ -116,11 +113,6 @@ hs_status hs_search_halve(hs_search *search);
 
 /* Frees what it has; idempotent. The call goes on. */
 void hs_search_close(hs_search *search);
-
-/*
- * From points, queries, box and options to a search that can be walked: with cells of its own, or
- * with those of another one.
- */
 
 /*
  * Everything up to the first group: threads and cells, or what can be reused of sets->built. On

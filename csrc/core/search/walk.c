@@ -1,10 +1,5 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "walk.h"
-#include "../base/os.h"
-#include "../cells/bins.h"
-
-#include <math.h>
-#include <string.h>
 
 /* walk.c: finds the links of each row once; then each group has a window of cells in each link.
  * Dense rows go by cell ids, sparse rows by a search for their indices. */
@@ -82,15 +77,15 @@ row_open(const hs_search *search, int64_t number, hs_row *row)
 {
     const hs_grid *grid = &search->grid;
     const hs_bins *asking = hs_search_asking(search);
-    row->first = row->next = first_point(search, number);
+    row->first = first_point(search, number);
     row->end = first_point(search, number + 1);
-    row->x = 0;
+    row->taken = (hs_sparse_group){.last = row->first};
     if (search->is_sparse) {
         row->base = number;
         for (int k = 1; k < grid->ndim; k++) {
             row->index[k] = asking->row_index[number * (grid->ndim - 1) + k - 1];
         }
-        row->taken = (hs_sparse_group){.last = row->first, .cell = asking->row_cell[number]};
+        row->taken.cell = asking->row_cell[number];
         return;
     }
     row->base = number * grid->shape[0];
@@ -114,18 +109,16 @@ hs_row_open_at(const hs_search *search, int32_t si, hs_row *row, hs_sparse_group
                                                        : hs_grid_index(&search->grid, 0, t);
 }
 
-/* The next group, with this target; false after the last. Groups depend on the scene and the target
- * alone. */
+/* Takes the next group, with this target; false after the last. Groups depend on the scene and the
+ * target alone. */
 static bool
-row_next(const hs_search *search, int32_t target, hs_row *row, hs_sparse_group *group)
+row_next(const hs_search *search, int32_t target, hs_row *row)
 {
     const hs_bins *asking = hs_search_asking(search);
     if (search->is_sparse) {
-        const bool found = hs_sparse_next_group(asking, row->base, HS_GROUP_POINTS, &row->taken);
-        *group = row->taken;
-        return found;
+        return hs_sparse_next_group(asking, row->base, HS_GROUP_POINTS, &row->taken);
     }
-    const int32_t first = row->next;
+    const int32_t first = row->taken.last;
     if (first >= row->end) {
         return false;
     }
@@ -137,25 +130,25 @@ row_next(const hs_search *search, int32_t target, hs_row *row, hs_sparse_group *
                cells[last + 1] - cells[last] <= apart) {
             last++;
         }
-        *group = (hs_sparse_group){.first = first,
-                                   .last = last + 1,
-                                   .x_first = cells[first] - row->base,
-                                   .x_last = cells[last] - row->base};
-        row->next = last + 1;
+        row->taken = (hs_sparse_group){.first = first,
+                                       .last = last + 1,
+                                       .x_first = cells[first] - row->base,
+                                       .x_last = cells[last] - row->base};
         return true;
     }
     const int32_t *start = asking->start + row->base;
-    while (start[row->x + 1] <= first) {
-        row->x++;
+    int64_t        x = row->taken.x_last;
+    while (start[x + 1] <= first) {
+        x++;
     }
-    int64_t last = row->x;
+    int64_t last = x;
     /* A cell more, while they are few; none beside the rest of a crowded one. */
     while (last + 1 < search->grid.shape[0] && start[last + 2] - first <= target) {
         last++;
     }
     const int32_t end = start[last + 1];
-    row->next = end - first > HS_GROUP_POINTS ? first + HS_GROUP_POINTS : end;
-    *group = (hs_sparse_group){first, row->next, row->x, last, 0};
+    row->taken = (hs_sparse_group){
+        first, end - first > HS_GROUP_POINTS ? first + HS_GROUP_POINTS : end, x, last, 0};
     return true;
 }
 
@@ -301,15 +294,14 @@ walk_row(hs_walker *walker, int64_t number, int32_t from, int32_t to)
             walker->scanner.work_since_poll += search->stencil.n_rows;
             status = hs_row_links(search, &walker->scanner.options, &cursor->row, cursor->links,
                                   cursor->hints, &cursor->n_links);
-            cursor->has_next = status == HS_OK &&
-                               row_next(search, cursor->target, &cursor->row, &cursor->next);
+            cursor->has_next = status == HS_OK && row_next(search, cursor->target, &cursor->row);
         }
         cursor->row_number = status == HS_OK ? number : -1;
     }
-    while (status == HS_OK && cursor->has_next && cursor->next.first < to) {
-        const hs_sparse_group group = cursor->next;
+    while (status == HS_OK && cursor->has_next && cursor->row.taken.first < to) {
+        const hs_sparse_group group = cursor->row.taken;
         cursor->last_first = group.first;
-        cursor->has_next = row_next(search, cursor->target, &cursor->row, &cursor->next);
+        cursor->has_next = row_next(search, cursor->target, &cursor->row);
         if (group.first >= from) {
             status = visit_group(walker, &group);
         }
@@ -429,18 +421,15 @@ hs_walker_init(hs_search *search, hs_block_use use, const hs_neighbourhood *most
     walker->scanner.visit = visit;
     walker->scanner.visit_context = context;
     if (status == HS_OK) {
-        cursor->links = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(hs_link));
+        const size_t of_hint = search->is_sparse ? sizeof(int64_t) : 0;
+        cursor->links = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(hs_link) + of_hint);
         cursor->most_links = n;
         status = cursor->links != NULL ? HS_OK : HS_ERR_MEMORY;
-    }
-    if (status == HS_OK && search->is_sparse) {
-        cursor->hints = hs_alloc(account, HS_FOR_STENCIL, n, sizeof(int64_t));
-        status = cursor->hints != NULL ? HS_OK : HS_ERR_MEMORY;
     }
     if (status != HS_OK) {
         hs_walker_close(search, walker);
     } else if (search->is_sparse) {
-        memset(cursor->hints, 0, (size_t)n * sizeof(int64_t));
+        cursor->hints = memset(cursor->links + n, 0, (size_t)n * sizeof(int64_t));
     }
     return status;
 }
@@ -482,12 +471,10 @@ hs_walker_close(hs_search *search, hs_walker *walker)
     hs_cursor  *cursor = &walker->cursor;
     hs_scanner *scanner = &walker->scanner;
     hs_scanner_flush_counters(search, scanner);
-    hs_free(account, cursor->hints); /* the last block first: the arena has it again */
-    hs_free(account, cursor->links);
+    hs_free(account, cursor->links); /* the last block first: the arena has it again */
     hs_free(account, scanner->pair_batch.memory);
     hs_free(account, scanner->block.order.memory);
     hs_free(account, scanner->block.memory);
-    cursor->hints = NULL;
     cursor->links = NULL;
     scanner->pair_batch.memory = scanner->block.order.memory = scanner->block.memory = NULL;
 }

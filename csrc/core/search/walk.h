@@ -2,7 +2,6 @@
 #ifndef HS_SEARCH_WALK_H
 #define HS_SEARCH_WALK_H
 
-#include "search.h"
 #include "scan.h"
 
 /*
@@ -23,9 +22,7 @@ typedef struct hs_row {
     int64_t         index[HS_MAX_DIM]; /* of its cells along axes 1, 2 ... */
     int64_t         base;              /* id of its first cell; in a sparse grid, of itself */
     int32_t         first, end;        /* its points */
-    int32_t         next;              /* first point of the next group */
-    int64_t         x;                 /* cell of that point; dense only */
-    hs_sparse_group taken;             /* the last group; sparse only */
+    hs_sparse_group taken;             /* the last group */
 } hs_row;
 
 /* A neighbouring row of the row being walked, with its image settled. */
@@ -69,15 +66,14 @@ typedef struct hs_bookmark {
 
 /* Where in the rows of cells a walk is. */
 typedef struct hs_cursor {
-    int32_t         target;     /* of groups, for row_next */
-    hs_row          row;        /* being walked: */
-    int64_t         row_number; /* its number, or -1 */
-    int32_t         last_first; /* first point of the last group that was taken, or -1 */
-    bool            has_next;
-    hs_sparse_group next;
-    hs_link        *links;               /* owned; of the row being walked */
-    int64_t         n_links, most_links; /* there are, and there is room for */
-    int64_t        *hints; /* owned; for hs_row_links, NULL unless the grid is sparse */
+    int32_t  target;              /* of groups, for row_next */
+    hs_row   row;                 /* being walked: */
+    int64_t  row_number;          /* its number, or -1 */
+    int32_t  last_first;          /* first point of the last group that was taken, or -1 */
+    bool     has_next;            /* row.taken is the next group */
+    hs_link *links;               /* owned; of the row being walked */
+    int64_t  n_links, most_links; /* there are, and there is room for */
+    int64_t *hints; /* for hs_row_links, behind the links; NULL unless the grid is sparse */
 } hs_cursor;
 
 /* Belongs to one thread. */

@@ -6,8 +6,6 @@
 #include "../base/os_thread.h"
 #include "../base/status.h"
 
-#include <string.h>
-
 /* call.c: options, memory, threads and counters of a call are in one struct, to which every step
  * adds. Its team works on a job, which is open while its tasks are handed out: threads that wake up
  * too late for it go back to sleep, so the caller never waits for them. */
@@ -246,17 +244,10 @@ hs_call_tell_limit(const hs_call *call, hs_status status, hs_failure *failure)
  * millisecond. Two threads take as long as one at 5000 points with 52 neighbours, at 1000 with 419.
  */
 #ifdef HS_TESTING
-static double worth_threads = 0.0;
-
-double
-hs_test_worth_threads(double n_points)
-{
-    const double before = worth_threads;
-    worth_threads = n_points;
-    return before;
-}
+double hs_test_worth_threads = 0.0;
+#define WORTH_THREADS hs_test_worth_threads
 #else
-static const double worth_threads = 10000.0;
+#define WORTH_THREADS 10000.0
 #endif
 /* A pair takes as long as so much of such a point, and half as long again for 16 bytes of it. */
 #define POINTS_PER_PAIR (1.0 / 45.0)
@@ -265,7 +256,7 @@ static const double worth_threads = 10000.0;
 int
 hs_call_threads(double n_points, const hs_options *options)
 {
-    const double least = options->threads < 0 ? (double)HS_POINTS_FOR_THREADS : worth_threads;
+    const double least = options->threads < 0 ? (double)HS_POINTS_FOR_THREADS : WORTH_THREADS;
     const int    most = options->threads < 0 ? -options->threads : options->threads;
     return n_points < least ? 1 : most < HS_MOST_THREADS ? most : HS_MOST_THREADS;
 }
@@ -331,8 +322,6 @@ hs_call_detach(hs_call *call)
     call->options.out = NULL;
     call->options.shells = NULL;
 }
-
-/* Each round is one job of the team. */
 
 typedef struct pass {
     hs_slab_fn run;

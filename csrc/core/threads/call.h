@@ -2,7 +2,6 @@
 #ifndef HS_THREADS_CALL_H
 #define HS_THREADS_CALL_H
 
-#include "../base/base.h"
 #include "../base/os.h"
 #include "../memory/memory.h"
 #include "../../kernels/kernel.h"
@@ -104,9 +103,8 @@ void hs_call_gather(hs_call *call, int64_t n_points);
 void hs_call_gather_for(hs_call *call, int64_t n_points, double n_pairs, bool are_kept);
 
 #ifdef HS_TESTING
-/* From how many points on threads are worth starting that the options name; in tests 0 at first.
- * Returns what it was before. */
-double hs_test_worth_threads(double n_points);
+/* From how many points on threads are worth starting that the options name; 0 at first. */
+extern double hs_test_worth_threads;
 #endif
 
 /* Ends them. Idempotent. */

@@ -1,11 +1,6 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "pair_list.h"
 #include "../collect/parallel.h"
-#include "../search/walk.h"
-#include "../memory/memory.h"
-#include "../base/status.h"
-#include "../base/os.h"
-#include "../exact/arithmetic.h"
 
 #include <string.h>
 
@@ -34,7 +29,6 @@ typedef struct building {
 /* What one thread works with. */
 typedef struct worker {
     hs_committer  committer;
-    building     *built; /* borrowed */
     hs_walker     walker;
     hs_list_part *plain, *shifted; /* of the piece that it is working on */
     /* Of the block that was looked at last: */
@@ -97,7 +91,7 @@ shift_of(const building *built, int64_t number, int32_t *shift)
 static bool
 add_run(worker *me, int32_t si, const int32_t *labels, int32_t n, int32_t image)
 {
-    const building *built = me->built;
+    const building *built = me->committer.job;
     const int32_t  *id = me->walker.scanner.block.id;
     bool            fits = true;
     for (int32_t h = 0, next; h < n && fits; h = next) {
@@ -120,7 +114,7 @@ static hs_status
 take_hits(void *context, hs_scanner *scanner, int32_t first, const hs_hits *hits)
 {
     worker         *me = context;
-    const building *built = me->built;
+    const building *built = me->committer.job;
     const hs_run   *runs = scanner->block.runs;
     const int32_t   n = hits->end[hits->n - 1], home = (int32_t)built->home;
     const int       m = scanner->search->bins.n_periodic;
@@ -166,10 +160,11 @@ static hs_status
 search_piece(void *context, int64_t number)
 {
     worker          *me = context;
-    const hs_search *search = &me->built->search;
-    const int64_t    n = search->bins.n, n_pieces = me->built->listing.n_pieces;
-    me->plain = &me->built->listing.parts[number];
-    me->shifted = &me->built->listing.parts[n_pieces + number];
+    const building  *built = me->committer.job;
+    const hs_search *search = &built->search;
+    const int64_t    n = search->bins.n, n_pieces = built->listing.n_pieces;
+    me->plain = &built->listing.parts[number];
+    me->shifted = &built->listing.parts[n_pieces + number];
     hs_output_reserve_hint(&me->plain->pairs, search->grid.expected_pairs / (double)n_pieces);
     return hs_walk(&me->walker, (int32_t)(n * number / n_pieces),
                    (int32_t)(n * (number + 1) / n_pieces), &me->committer.failure);
@@ -182,7 +177,6 @@ open_worker(void *context, void *place)
     hs_search *search = &built->search;
     worker    *me = place;
     me->committer.options = &me->walker.scanner.options;
-    me->built = built;
     me->block = -1;
     const hs_status status =
         hs_walker_init(search, HS_BLOCK_LISTS_PLACES, NULL, take_hits, me, &me->walker);
@@ -363,7 +357,6 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
     searching.cell_size = 0.0;
     searching.algorithm = HS_AUTO;
     searching.out = NULL;
-    searching.counters = NULL;
     searching.want = HS_WANT_I | HS_WANT_J;
     searching.want |= hs_frame_periodic(frame, row) > 0 ? HS_WANT_SHIFT : 0;
     searching.index_bytes = 4;
@@ -414,18 +407,18 @@ hs_listing_build(const hs_frame *frame, const hs_options *options, double radius
 #define TILE 64 /* points whose displacements are held at a time; whole chains of a maximum */
 
 typedef struct tracking {
-    const hs_motion *motion;
-    bool             deformed;
-    hs_strain        strain;
-    hs_lattice       lattice; /* of the box now */
-    int              m;
-    double           jump; /* longer displacements are looked at; infinity: none */
-    double           drift[HS_MAX_DIM];
-    hs_store        *jumps;
-    int64_t         *jump_of;   /* in it, m a point; NULL: there is none yet */
-    double           square;    /* largest |u|^2 ... */
-    double           component; /* ... and |u_k| */
-    double           magnitude; /* of the terms of wrapping */
+    const hs_frame *built, *now; /* borrowed */
+    bool            deformed;
+    hs_strain       strain;
+    hs_lattice      lattice; /* of the box now */
+    int             m;
+    double          jump; /* longer displacements are looked at; infinity: none */
+    double          drift[HS_MAX_DIM];
+    void          **jumps;
+    int64_t        *jump_of;   /* in it, m a point; NULL: there is none yet */
+    double          square;    /* largest |u|^2 ... */
+    double          component; /* ... and |u_k| */
+    double          magnitude; /* of the terms of wrapping */
 } tracking;
 
 /* u of the points of one tile, one array for each axis. */
@@ -443,7 +436,7 @@ typedef struct tile {
 HS_ALWAYS_INLINE void
 subtract(const tracking *track, tile *t, const hs_real real, const int d, const bool deformed)
 {
-    const void   *now = track->motion->now->points.data, *built = track->motion->built->points.data;
+    const void   *now = track->now->points.data, *built = track->built->points.data;
     const int64_t first = t->first * d, step = t->step * d;
     for (int p = 0; p < t->n; p++) {
         for (int k = 0; k < d; k++) {
@@ -528,8 +521,8 @@ take_jumps(tracking *track, tile *t, bool keeps)
             any |= (uint64_t)given[r];
         }
         if (any != 0 && track->jump_of == NULL) { /* no jumps yet */
-            const int64_t n = track->motion->now->points.n * m;
-            track->jump_of = hs_store_reserve(track->jumps, HS_FOR_WRAPS, n, sizeof(int64_t));
+            const int64_t n = track->now->points.n * m;
+            track->jump_of = hs_reserve(track->jumps, HS_FOR_WRAPS, n, sizeof(int64_t));
             if (track->jump_of == NULL) {
                 return HS_ERR_MEMORY;
             }
@@ -547,7 +540,7 @@ take_jumps(tracking *track, tile *t, bool keeps)
 static hs_status
 look_at_tile(tracking *track, int64_t first, int64_t step, bool keeps, tile *t)
 {
-    const hs_points *points = &track->motion->now->points;
+    const hs_points *points = &track->now->points;
     const hs_real    real = points->real;
     const int        d = points->ndim;
     const int64_t    left = (points->n - first + step - 1) / step;
@@ -593,8 +586,8 @@ look_at_tile(tracking *track, int64_t first, int64_t step, bool keeps, tile *t)
 static void
 guess_drift(tracking *track)
 {
-    const int64_t n = track->motion->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
-    const int     d = track->motion->now->points.ndim;
+    const int64_t n = track->now->points.n, step = (n + SAMPLE - 1) / SAMPLE;
+    const int     d = track->now->points.ndim;
     double        sum[HS_MAX_DIM] = {0.0}, lower[HS_MAX_DIM] = {0.0}, upper[HS_MAX_DIM] = {0.0};
     double        longest[2], count = 0.0;
     tile          t;
@@ -625,10 +618,9 @@ guess_drift(tracking *track)
 static double
 bound_rounding(const tracking *track)
 {
-    const hs_motion *motion = track->motion;
-    const int        d = motion->now->points.ndim;
-    const double     now = motion->now->largest, built = motion->built->largest;
-    double           bound = 0.0;
+    const int    d = track->now->points.ndim;
+    const double now = track->now->largest, built = track->built->largest;
+    double       bound = 0.0;
     for (int k = 0; k < d; k++) {
         bound += 2.0 * UNIT * fabs(track->drift[k]); /* of a u near it, and of the difference */
     }
@@ -644,37 +636,13 @@ bound_rounding(const tracking *track)
     return 3.0 * bound * GROW; /* of each component; sqrt(d) < 3 */
 }
 
-/* What is left of the skin. Each step is rounded to the safe side. */
-static double
-find_margin(const tracking *track)
-{
-    const hs_motion *motion = track->motion;
-    double           reach = motion->radius, longest = 0.0;
-    if (track->square >= 0x1p-900 && track->square <= 0x1p1000) {
-        longest = sqrt(track->square) * (1.0 + 0x1p-47); /* above roundings of square and root */
-    } else if (track->component != 0.0) {
-        longest = hs_next_up(3.0 * track->component); /* sqrt(8) < 3; squares lost or infinite */
-    }
-    double used = longest + bound_rounding(track);
-    used = used > 0.0 ? 2.0 * hs_next_up(used) : used; /* nothing is nothing */
-    if (track->deformed) {
-        /* No two points are farther apart than 2 sqrt(d) times the largest coordinate. */
-        const double apart = 6.0 * motion->built->largest;
-        reach = hs_next_down(reach * track->strain.shrink);
-        used = hs_next_up(used + hs_next_up(track->strain.residual * apart) * GROW);
-    }
-    const double room = reach - motion->cutoff;
-    const double margin = (room > 0.0 && motion->cutoff > 0.0 ? hs_next_down(room) : room) - used;
-    return margin > 0.0 && used > 0.0 ? hs_next_down(margin) : margin;
-}
-
 hs_status
-hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin, bool *jumped,
-                 hs_store *jumps)
+hs_motion_margin(const hs_verlet *list, const hs_frame *now, const hs_options *options,
+                 double *margin, bool *jumped, void **jumps)
 {
-    const hs_frame *built = motion->built, *now = motion->now;
+    const hs_frame *built = &list->frames[list->built];
     const int64_t   n = now->points.n;
-    tracking        track = {.motion = motion, .jumps = jumps, .jump = INFINITY};
+    tracking        track = {.built = built, .now = now, .jumps = jumps, .jump = INFINITY};
     tile            t;
     int             row[HS_MAX_DIM];
     hs_status       status = HS_OK;
@@ -703,10 +671,28 @@ hs_motion_margin(const hs_motion *motion, const hs_options *options, double *mar
             status = hs_poll(options, 0.0);
         }
     }
-    if (status == HS_OK) {
-        const double found = find_margin(&track);
-        *margin = found == found ? found : -INFINITY;
-        *jumped = track.jump_of != NULL;
+    if (status != HS_OK) {
+        return status == HS_REBUILD ? HS_OK : status;
     }
-    return status == HS_REBUILD ? HS_OK : status;
+    /* What is left of the skin. Each step is rounded to the safe side. */
+    double reach = list->listing.radius, longest = 0.0;
+    if (track.square >= 0x1p-900 && track.square <= 0x1p1000) {
+        longest = sqrt(track.square) * (1.0 + 0x1p-47); /* above roundings of square and root */
+    } else if (track.component != 0.0) {
+        longest = hs_next_up(3.0 * track.component); /* sqrt(8) < 3; squares lost or infinite */
+    }
+    double used = longest + bound_rounding(&track);
+    used = used > 0.0 ? 2.0 * hs_next_up(used) : used; /* nothing is nothing */
+    if (track.deformed) {
+        /* No two points are farther apart than 2 sqrt(d) times the largest coordinate. */
+        const double apart = 6.0 * built->largest;
+        reach = hs_next_down(reach * track.strain.shrink);
+        used = hs_next_up(used + hs_next_up(track.strain.residual * apart) * GROW);
+    }
+    const double room = reach - list->cutoff;
+    double       left = (room > 0.0 && list->cutoff > 0.0 ? hs_next_down(room) : room) - used;
+    left = left > 0.0 && used > 0.0 ? hs_next_down(left) : left;
+    *margin = left == left ? left : -INFINITY;
+    *jumped = track.jump_of != NULL;
+    return HS_OK;
 }

@@ -3,7 +3,6 @@
 #define HS_VERLET_PAIR_LIST_H
 
 #include "../scene/scene.h"
-#include "../../kernels/slab.h"
 #include "../collect/columns.h"
 
 /*
@@ -52,7 +51,7 @@ struct hs_verlet {
     double     tried;      /* the margin of the last step before the list was built for it */
     hs_frame   frames[3];  /* two are in use, one is for the next step */
     int        built, now; /* numbers of frames: the step it was built for, the last step */
-    hs_store   jumps[2];   /* since it was built: those of the last step and of the next */
+    void      *jumps[2];   /* owned; since it was built: those of the last step and of the next */
     int        jumps_now;  /* which of them; -1: nothing has jumped */
 };
 
@@ -67,23 +66,15 @@ void hs_listing_free(hs_listing *listing);
  * docs/verlet.md derives the inequality.
  */
 
-/* What is compared; all borrowed. */
-typedef struct hs_motion {
-    const hs_frame *built;  /* the step that the list was built for */
-    const hs_frame *now;    /* hs_frames_match */
-    double          radius; /* the list has every pair up to here */
-    double          cutoff;
-} hs_motion;
-
 /*
- * *margin: by how much pairs may still come closer, in the unit of points, rounded down. At least
- * 0: every pair within the cutoff now is in the list. Below 0: it may not be; -infinity where
- * nothing is known. *jumped: some point has jumped by whole box vectors, and `jumps` says by how
- * many of each that repeats, int64 (n, m); else `jumps` has no meaning. HS_ERR_MEMORY,
- * HS_ERR_INTERRUPTED.
+ * From the frame that the list was built for to `now`, which hs_frames_match. *margin: by how much
+ * pairs may still come closer, in the unit of points, rounded down. At least 0: every pair within
+ * the cutoff now is in the list. Below 0: it may not be; -infinity where nothing is known. *jumped:
+ * some point has jumped by whole box vectors, and `jumps` says by how many of each that repeats,
+ * int64 (n, m); else `jumps` has no meaning. HS_ERR_MEMORY, HS_ERR_INTERRUPTED.
  */
-hs_status hs_motion_margin(const hs_motion *motion, const hs_options *options, double *margin,
-                           bool *jumped, hs_store *jumps);
+hs_status hs_motion_margin(const hs_verlet *list, const hs_frame *now, const hs_options *options,
+                           double *margin, bool *jumped, void **jumps);
 
 /*
  * recheck.c: the pairs of a list that are within the cutoff now, decided as a search decides them:

@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: BSD-3-Clause */
 #include "pair_list.h"
-#include "../exact/metric.h"
-#include "../collect/record.h"
-#include "../base/os.h"
 #include "../collect/parallel.h"
 #include "../collect/sort_pairs.h"
-#include "../scene/scene.h"
 
 #include <math.h>
 #include <string.h>
@@ -75,28 +71,6 @@ typedef struct slab_hits {
 #define SAMPLE 128
 /* Cutoffs between 2^-20 and 2^20 are not scaled: float32 has room for their squares. */
 #define ORDINARY_EXPONENT 20
-
-/* Counts of the step: those of the list and the jumps since then. */
-static void
-add_counts(checking *recheck)
-{
-    const hs_verlet  *list = recheck->list;
-    const hs_listing *listing = &list->listing;
-    const int64_t     n = recheck->now->points.n;
-    const int         m = recheck->m;
-    const int64_t    *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now].data : NULL;
-    for (int64_t a = 0; a < n; a++) {
-        const int64_t *jump = jumps != NULL ? jumps + (int64_t)listing->order[a] * m : NULL;
-        if (jumps != NULL && a + POINTS_AHEAD < n) {
-            HS_PREFETCH(jumps + (int64_t)listing->order[a + POINTS_AHEAD] * m);
-        }
-        for (int r = 0; r < m; r++) {
-            const int64_t count = listing->counts[a * m + r] + (jump != NULL ? jump[r] : 0);
-            recheck->counts[a * m + r] = count;
-            recheck->most_counts = hs_larger(fabs((double)count), recheck->most_counts);
-        }
-    }
-}
 
 /* Point number `a` of the list in the frame of its images, in float64: r - count h. */
 HS_ALWAYS_INLINE void
@@ -326,16 +300,12 @@ decide_unsure(const checking *recheck, slab_hits *slab)
             n_gone += !within[e];
         }
     }
-    for (int32_t g = 0, to = gone[0]; g < n_gone; g++) {
-        const int32_t from = gone[g] + 1, end = g + 1 < n_gone ? gone[g + 1] : slab->of.n_hits;
-        memmove(slab->hits + to, slab->hits + from, (size_t)(end - from) * sizeof *slab->hits);
-        to += end - from;
-    }
-    for (int32_t t = 0, before = 0; t < slab->of.n_bundles; t++) {
-        while (before < n_gone && gone[before] < slab->hits_end[t]) {
-            before++;
+    for (int32_t t = 0, h = 0, g = 0; n_gone > 0 && t < slab->of.n_bundles; t++) {
+        for (; h < slab->hits_end[t]; h++) {
+            slab->hits[h - g] = slab->hits[h];
+            g += g < n_gone && gone[g] == h;
         }
-        slab->hits_end[t] -= before;
+        slab->hits_end[t] -= g;
     }
     slab->of.n_hits -= n_gone;
 }
@@ -691,10 +661,8 @@ put_shifts(const checking *recheck, const slab_hits *slab, const hs_output *outp
 /* What one thread works with. */
 typedef struct worker {
     hs_committer committer;
-    checking    *recheck; /* borrowed */
-    slab_hits   *slab;    /* owned */
-    hs_output   *output;  /* pairs that wait for their turn, or where nothing is shared all */
-    int64_t      work;    /* since the last poll */
+    slab_hits   *slab;   /* owned */
+    hs_output   *output; /* pairs that wait for their turn, or where nothing is shared all */
     hs_counters  done;
 } worker;
 
@@ -743,7 +711,7 @@ find_hits(const checking *recheck, int64_t s, slab_hits *slab)
 static hs_status
 do_slab(worker *me, int64_t s)
 {
-    const checking *recheck = me->recheck;
+    const checking *recheck = me->committer.job;
     hs_output      *output = me->output;
     slab_hits      *slab = me->slab;
     find_hits(recheck, s, slab);
@@ -752,8 +720,8 @@ do_slab(worker *me, int64_t s)
     me->done.by_float64 += slab->stages.by_float64;
     me->done.by_double_word += slab->stages.by_double_word;
     me->done.by_integers += slab->stages.by_integers;
-    me->work += slab->of.end - slab->of.first + INTEGER_WORK * slab->stages.by_integers +
-                (recheck->measures ? MEASURE_WORK * (int64_t)slab->of.n_hits : 0);
+    const int64_t work = slab->of.end - slab->of.first + INTEGER_WORK * slab->stages.by_integers +
+                         (recheck->measures ? MEASURE_WORK * (int64_t)slab->of.n_hits : 0);
     const double done = (double)(s + 1) / (double)recheck->list->listing.n_slabs;
     hs_status    status = hs_output_reserve(output, slab->of.n_hits, recheck->shared ? 0.0 : done);
     if (status == HS_OK && slab->of.n_hits > 0) {
@@ -769,11 +737,7 @@ do_slab(worker *me, int64_t s)
         }
         output->n_pairs += status == HS_OK ? slab->of.n_hits : 0;
     }
-    if (status == HS_OK && me->work > POLL_WORK) {
-        me->work = 0;
-        status = hs_poll(me->committer.options, done);
-    }
-    return status;
+    return status == HS_OK ? hs_note_work(&me->committer, work, POLL_WORK, done) : status;
 }
 
 /* A hs_range_fn. */
@@ -781,7 +745,7 @@ static hs_status
 do_range(void *context, int64_t range)
 {
     worker         *me = context;
-    const checking *recheck = me->recheck;
+    const checking *recheck = me->committer.job;
     const int64_t first = range * recheck->in_range, left = recheck->list->listing.n_slabs - first;
     const int64_t end = first + (left < recheck->in_range ? left : recheck->in_range);
     hs_status     status = HS_OK;
@@ -799,7 +763,6 @@ open_worker(void *context, void *place)
 {
     checking *recheck = context;
     worker   *me = place;
-    me->recheck = recheck;
     me->output = recheck->shared ? me->committer.pairs : recheck->output;
     me->slab = hs_alloc(&recheck->call->account, HS_FOR_CANDIDATES, 1, sizeof *me->slab);
     return me->slab != NULL ? HS_OK : HS_ERR_MEMORY;
@@ -818,7 +781,8 @@ close_worker(void *context, void *place)
 static hs_status
 run(checking *recheck, hs_failure *failure)
 {
-    const hs_listing *listing = &recheck->list->listing;
+    const hs_verlet  *list = recheck->list;
+    const hs_listing *listing = &list->listing;
     const int64_t     n = recheck->now->points.n, n_slabs = listing->n_slabs;
     const int         m = recheck->m, stride = hs_slab_stride(recheck->d);
     const unsigned    columns = recheck->output->columns;
@@ -860,7 +824,19 @@ run(checking *recheck, hs_failure *failure)
         const int      exponent = cutoff > 0.0 ? ilogb(cutoff) : 0;
         const bool     ordinary = exponent >= -ORDINARY_EXPONENT && exponent <= ORDINARY_EXPONENT;
         const hs_scale scale = hs_scale_of(ordinary ? 0 : exponent);
-        add_counts(recheck);
+        const int32_t *order = listing->order;
+        const int64_t *jumps = list->jumps_now >= 0 ? list->jumps[list->jumps_now] : NULL;
+        for (int64_t a = 0; a < n; a++) { /* those of the list, and the jumps since then */
+            const int64_t *jump = jumps != NULL ? jumps + (int64_t)order[a] * m : NULL;
+            if (jumps != NULL && a + POINTS_AHEAD < n) {
+                HS_PREFETCH(jumps + (int64_t)order[a + POINTS_AHEAD] * m);
+            }
+            for (int r = 0; r < m; r++) {
+                const int64_t count = listing->counts[a * m + r] + (jump != NULL ? jump[r] : 0);
+                recheck->counts[a * m + r] = count;
+                recheck->most_counts = hs_larger(fabs((double)count), recheck->most_counts);
+            }
+        }
         set_thresholds(recheck, scale, put_points(recheck, scale));
         set_shifts(recheck);
     }
@@ -919,6 +895,5 @@ hs_recheck_find(const hs_verlet *list, hs_pairs *pairs, hs_failure *failure)
         failure->expected_pairs = fmax(failure->expected_pairs, (double)recheck.output->n_pairs);
     }
     hs_output_free(&found);
-    hs_call_tell_limit(call, status, failure);
     return hs_pairs_conclude(&pairs->output, status, failure);
 }

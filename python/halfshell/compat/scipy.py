@@ -8,8 +8,9 @@ floats, while SciPy compares rounded squares. So the answers differ if rounding 
 
 With `boxsize` the nearest image of a point counts, as there. SciPy itself answers what is not
 decided here: `p` other than 2, `eps` above 0, more than 8 dimensions, radii that are negative or
-infinite, and, with `boxsize`, all of a call one of whose radii is half a period or more, and of the
-nearest the points that lack some within half a period.
+infinite, and, with `boxsize`, all of a call one of whose radii is half a period or more, or which
+asks for about as many of the nearest as lie within half a period, and otherwise those points that
+lack some within half a period.
 
 Lists of neighbours ascend, also where SciPy's have no order; among neighbours at the same distance
 `query` has the lowest numbers. `workers` is the number of threads; methods without it use as many
@@ -91,13 +92,17 @@ class _Searches:
         workers: Any = 1,
     ) -> Any:
         """As SciPy's; but ValueError if any of `k` is less than 1, where SciPy crashes."""
-        asked, shape = self._asked(x, p, eps)
         threads, ranks = _as_threads(workers), _as_ranks(k)
-        bound = distance_upper_bound
-        bound = float(bound) if _is_number(bound) and float(bound) >= 0.0 else None
-        if asked is None or threads is None or ranks is None or bound is None or not self.n:
+        most = 0 if ranks is None else ranks if isinstance(ranks, int) else int(ranks.max())
+        bound = float(distance_upper_bound) if _is_number(distance_upper_bound) else -1.0
+        is_ours = threads is not None and most > 0 and bound >= 0.0 and self.n > 0
+        # Where many queries would have to be asked again of SciPy, it is asked at once.
+        if is_ours and bound > self._half:
+            of_all = min(most, self.n)
+            is_ours = of_all + math.sqrt(of_all - 1) <= self._expected
+        asked, shape = self._asked(x, p, eps) if is_ours else (None, ())
+        if asked is None:
             return super().query(x, k, eps, p, distance_upper_bound, workers)  # type: ignore[misc]
-        most = ranks if isinstance(ranks, int) else int(ranks.max())
         i, d = self._nearest(asked, most, bound, threads)
         i, d = _columns_of(i, ranks, self.n), _columns_of(d, ranks, np.inf)
         if not isinstance(ranks, int) or ranks != 1:
@@ -268,6 +273,14 @@ class _Searches:
         return float(np.min(self.boxsize, where=self.boxsize > 0.0, initial=np.inf)) / 2.0
 
     @cached_property
+    def _expected(self) -> float:
+        """How many points of an even scene are closer than half the shortest period."""
+        if self.boxsize is None or self.m > 8 or not (self.boxsize > 0.0).all():
+            return np.inf
+        ball: float = math.pi ** (self.m / 2) / math.gamma(self.m / 2 + 1)
+        return self.n * ball * float(np.prod(self._half / self.boxsize))
+
+    @cached_property
     def _farthest(self) -> float:
         """The largest distance that is below half a period."""
         return self._half if self._half == np.inf else math.nextafter(self._half, 0.0)
@@ -296,13 +309,13 @@ class _Searches:
             radii = np.asarray(r, np.float64)
         except (TypeError, ValueError):
             return None
-        if radii.ndim > 1 or not radii.size or not (radii >= 0.0).all():
-            return None
-        if not (radii < self._half).all():
+        if radii.ndim > 1 or not radii.size:
             return None
         radii = radii.reshape(-1)
-        if (radii[1:] > radii[:-1]).all():
+        if (radii[1:] > radii[:-1]).all() and self._is_near(radii[0]) and self._is_near(radii[-1]):
             return radii, np.arange(len(radii))
+        if not ((radii >= 0.0) & (radii < self._half)).all():
+            return None
         within, places = np.unique(radii, return_inverse=True)
         if not cumulative and (np.diff(places.reshape(-1)) < 0).any():
             return None
@@ -387,7 +400,9 @@ class _Searches:
         order = np.argsort(i, kind="stable")
         return i[order], j[order], d[order]
 
-    def _nearest(self, asked: _Points, k: int, bound: float, threads: int) -> tuple[Any, Any]:
+    def _nearest(
+        self, asked: _Points, k: int, bound: float, threads: int | None
+    ) -> tuple[Any, Any]:
         """Numbers and distances, with n and infinity where there are none."""
         points, box = self._searched(None)
         within = bound if bound <= self._half else self._farthest

@@ -363,7 +363,8 @@ plans_join_levels_unless_told_otherwise(void)
     for (int i = 0; i < N; i++)
         radii[i] = i % 2 ? 0.5 : 0.2;
     options.cutoff = INFINITY;
-    const bool joins = hs_test_join_levels(true);
+    const bool joins = hs_test_joins_levels;
+    hs_test_joins_levels = true;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches == 1);
     const double expected = plan.expected_pairs;
     options.algorithm = HS_HIERARCHY;
@@ -374,7 +375,7 @@ plans_join_levels_unless_told_otherwise(void)
     points.at.n = N;
     options.algorithm = HS_AUTO;
     CHECK(hs_plan_make(&among, &options, &plan, NULL) == HS_OK && plan.n_searches > 1);
-    (void)hs_test_join_levels(joins);
+    hs_test_joins_levels = joins;
 }
 
 /*

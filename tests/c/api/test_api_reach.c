@@ -662,7 +662,7 @@ every_entry_fails_cleanly(void)
                    (hs_rule)(trial / 2), 0, &scene_entries);
         for (int which = 0; which < ENTRIES; which++) {
             entry_call e = entry_of((entry)which);
-            if (run_entry(&e) != HS_OK) {
+            if ((IS_SLOW && (trial / 2 + which) % 2 != 0) || run_entry(&e) != HS_OK) {
                 continue;
             }
             expectation again = {entry_of((entry)which), e.answer};

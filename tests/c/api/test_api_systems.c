@@ -221,6 +221,9 @@ the_same_as_single_calls(void)
 {
     for (uint64_t seed = 1; seed <= TRIALS(4); seed++) {
         for (int kind = 0; kind < 32 * N_REACHES; kind++) {
+            const int parity = kind ^ kind >> 1 ^ kind >> 2 ^ kind >> 3 ^ kind >> 4;
+            if (IS_SLOW && (parity & 1) != 0) /* half of them, with any four of the five */
+                continue;
             make_scene(seed, seed % 2 == 1 ? 0.5 : 3.0);
             set_reach(kind / 32);
             batch.options.sorted = kind & 1;
@@ -280,7 +283,7 @@ nothing_is_lost_when_memory_is_short(void)
         if (IS_SLOW && (kind + kind / 2 + of) % 2 != 0) /* rows with one thread, pairs with two */
             continue;
         make_scene(33, 0.5);
-        keep_first(6);
+        keep_first(IS_SLOW ? 4 : 6);
         set_reach(of < N_REACHES ? of : 0);
         batch.systems.selection = of > N_REACHES ? &one_excluded : NULL;
         batch.options.threads = kind & 1 ? 2 : 1;

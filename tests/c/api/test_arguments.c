@@ -630,7 +630,7 @@ one_refusal_ends_any_search(void)
     for (int trial = 0; trial < 18; trial++) {
         refusal once = {.nth = 0, .twice = trial / 3 == 5};
         CHECK(search(trial / 3, trial % 3, &once) == HS_OK);
-        const int64_t polls = once.n, step = 1 + polls / 8;
+        const int64_t polls = once.n, step = 1 + polls / (IS_SLOW ? 3 : 8);
         CHECK(polls > 0);
         for (int64_t nth = 1; nth <= polls; nth += step) {
             once = (refusal){.nth = nth, .twice = once.twice};

@@ -229,7 +229,7 @@ independent(int ndim, int n, matrix a)
 static void
 sums_of_far_magnitudes_are_dependent(void)
 {
-    for (int exponent = 0; exponent < 1000; exponent++) {
+    for (int exponent = 0; exponent < 1000; exponent += IS_SLOW ? 7 : 1) {
         const double one = ldexp(1.0, exponent), other = ldexp(256.0, exponent);
         matrix       a = {{1.0, other, 1.0}, {1.0, one, 3.0}, {2.0, one + other, 4.0}};
         CHECK(!independent(3, 3, a));

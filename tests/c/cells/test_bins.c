@@ -131,8 +131,8 @@ compare_order(double cutoff, int threads, int nth, const int32_t *expected, int 
     *n_refused += status != HS_OK;
     if (status == HS_OK) {
         CHECK(memcmp(bins.order, expected, FEW * sizeof *expected) == 0);
-        hs_bins_free(&s.account, &bins);
     }
+    hs_bins_free(&s.account, &bins);
     close_scene(&s);
     hs_team_free(team);
     return disturbed;
@@ -143,21 +143,21 @@ compare_order(double cutoff, int threads, int nth, const int32_t *expected, int 
 static bool
 check_queries(const sorted *of_points, int64_t n, int nth)
 {
-    const hs_grid *grid = &of_points->grid;
-    int64_t       *cells = malloc((size_t)(n + 1) * sizeof *cells);
-    double         squares = 0.0;
-    sorted         s;
-    hs_bins        bins;
+    hs_grid  grid = of_points->grid;
+    int64_t *cells = malloc((size_t)(n + 1) * sizeof *cells);
+    double   squares = 0.0;
+    sorted   s;
+    hs_bins  bins;
     open_scene(2, n, of_points->options.cutoff, NULL, &s);
     for (int64_t i = 0; i < n; i++) {
         cells[i] = 0;
         for (int k = 0; k < 2; k++)
             cells[i] +=
-                hs_grid_index(grid, k, hs_scene_coordinate(&s.scene, i, k)) * grid->stride[k];
+                hs_grid_index(&grid, k, hs_scene_coordinate(&s.scene, i, k)) * grid.stride[k];
     }
     hs_test_fail_allocation(nth);
     const hs_status status =
-        hs_bins_build(&s.account, NULL, &s.options, &s.scene, grid, true, &bins);
+        hs_bins_build(&s.account, NULL, &s.options, &s.scene, &grid, true, &bins);
     const bool disturbed = nth > 0 && !hs_test_failure_is_due();
     hs_test_fail_allocation(0);
     CHECK(status == (disturbed ? HS_ERR_MEMORY : HS_OK));
@@ -171,8 +171,8 @@ check_queries(const sorted *of_points, int64_t n, int nth)
     }
     if (status == HS_OK) {
         CHECK(bins.start == NULL && bins.squares == squares);
-        hs_bins_free(&s.account, &bins);
     }
+    hs_bins_free(&s.account, &bins);
     free(cells);
     close_scene(&s);
     return !disturbed;

@@ -160,7 +160,7 @@ flat_frames_prune_nothing(void)
     CHECK(hs_stencil_build(&account, &options, &grid_scene, &grid, true, &whole) == HS_OK);
     CHECK(whole.n_rows == 2 * grid.reach[1] + 1);
     const int64_t n_rows = whole.n_rows;
-    hs_stencil_free(&account, &whole);
+    hs_free(&account, whole.rows);
     lattice->direction[1][1] = 1.0; /* nor do directions that are not those of the normals */
     CHECK(hs_stencil_build(&account, &options, &grid_scene, &grid, true, &whole) == HS_OK);
     CHECK(whole.n_rows == n_rows);
@@ -172,8 +172,8 @@ flat_frames_prune_nothing(void)
     for (int64_t r = 0; r < pruned.n_rows; r++)
         narrower += pruned.rows[r].last - pruned.rows[r].first < 2 * grid.reach[0];
     CHECK(pruned.n_rows == whole.n_rows ? narrower > 0 : pruned.n_rows < whole.n_rows);
-    hs_stencil_free(&account, &pruned);
-    hs_stencil_free(&account, &whole);
+    hs_free(&account, pruned.rows);
+    hs_free(&account, whole.rows);
     close_scene();
 }
 

@@ -304,6 +304,32 @@ few_edges_decide_nothing(void)
     hs_pairs_free(pairs);
 }
 
+/* All pairs are: more of a group than are decided together. */
+static void
+every_pair_is_at_an_edge(void)
+{
+    const double at[] = {0.0, 1.0};
+    make_lattice();
+    points.n = 300;
+    for (int64_t e = 0; e < points.n; e++) {
+        x[3 * e] = (double)(e % 2);
+        x[3 * e + 1] = x[3 * e + 2] = 0.0;
+    }
+    options.want = HS_WANT_SHELL | HS_WANT_BOTH;
+    options.cutoff = 1.0;
+    options.n_shells = 2;
+    options.shells = at;
+    hs_pairs *pairs;
+    CHECK(hs_pairs_find(AMONG(&points, NULL), &options, &pairs, NULL) == HS_OK);
+    const int32_t *shell = hs_pairs_array(pairs, HS_WANT_SHELL);
+    const int64_t *both = hs_pairs_array(pairs, HS_WANT_BOTH);
+    int64_t        wrong = 0;
+    for (int64_t e = 0; e < hs_pairs_length(pairs); e++)
+        wrong += shell[e] != (both[2 * e] + both[2 * e + 1]) % 2;
+    CHECK(hs_pairs_length(pairs) == 300 * 299 / 2 && wrong == 0);
+    hs_pairs_free(pairs);
+}
+
 /* Into arrays of the caller's. */
 static void
 shells_go_where_the_caller_says(void)
@@ -470,6 +496,7 @@ test_record(void)
     RUN(large_blocks_can_be_stopped);
     RUN(pairs_are_in_the_innermost_shell);
     RUN(few_edges_decide_nothing);
+    RUN(every_pair_is_at_an_edge);
     RUN(shells_go_where_the_caller_says);
     RUN(bad_shells_are_refused);
     RUN(refused_memory_leaves_nothing);

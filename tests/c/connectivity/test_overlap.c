@@ -121,6 +121,9 @@ rows_that_are_none_are_refused(void)
     CHECK(find(&fine) == HS_OK);
     fine = (hs_index_rows){.n = 2, .offsets = none};
     CHECK(find(&fine) == HS_OK);
+    fine.indices = one;
+    fine.n_indices = INT64_C(1) << 50; /* there is no room for so many, whatever they are */
+    CHECK(find(&fine) == HS_ERR_MEMORY);
     for (size_t k = 0; k < sizeof wrong / sizeof *wrong; k++) {
         hs_index_rows rows = wrong[k];
         CHECK(find(&rows) == HS_ERR_ARGUMENT);

@@ -17,15 +17,16 @@ void test_ball(void);
  * any width, radius and distance from the origin.
  */
 
-static hs_axes
-axes_of(double length, double cell_size, double radius)
+/* The axis of a list in one dimension. */
+static hs_axis
+axis_of(double length, double cell_size, double radius)
 {
-    hs_box     box = {.ndim = 1, .periodic = {length > 0.0}, .rows = {{length}}};
-    hs_lattice lattice;
-    hs_axes    axes;
-    hs_lattice_init(length > 0.0 ? &box : NULL, 1, hs_scale_of(0), &lattice);
-    hs_axes_init(&axes, &lattice, cell_size, false, radius);
-    return axes;
+    static hs_dynamic list;
+    hs_box            box = {.ndim = 1, .periodic = {length > 0.0}, .rows = {{length}}};
+    hs_lattice_init(length > 0.0 ? &box : NULL, 1, hs_scale_of(0), &list.lattice);
+    list.max_radius = radius;
+    hs_axes_init(&list, cell_size, false);
+    return list.axis[0];
 }
 
 /* A number of ordinary size, often with few digits. */
@@ -41,23 +42,23 @@ open_balls_hold_what_is_within(void)
 {
     harness_random random = {7};
     for (int trial = 0; trial < TRIALS(200000); trial++) {
-        const double   width = fabs(some_number(&random)) + 0x1p-20;
-        const int      times = (int)(random_bits(&random) % 5);
-        const double   radius = trial % 2 == 0 ? width * times : width * 5.0 * random_unit(&random);
-        const hs_axes  axes = axes_of(0.0, width, radius);
-        const hs_axis *axis = &axes.axis[0];
-        const double   t = some_number(&random);
+        const double  width = fabs(some_number(&random)) + 0x1p-20;
+        const int     times = (int)(random_bits(&random) % 5);
+        const double  radius = trial % 2 == 0 ? width * times : width * 5.0 * random_unit(&random);
+        const hs_axis of_width = axis_of(0.0, width, radius), *axis = &of_width;
+        const double  t = some_number(&random);
+        const int64_t centre = hs_axis_cell(axis, t);
         hs_span_of_cells span;
-        hs_axis_span(axis, t, hs_axis_cell(axis, t), radius, 0.0, &span);
+        hs_axis_span(axis, t, radius, 0.0, &span);
         for (int side = -1; side <= 1; side += 2) {
             double y = t + side * radius;
             while (fabs(y - t) > radius) /* not beyond, for the numbers as rounded */
                 y = nextafter(y, t);
             const int64_t cell = hs_axis_cell(axis, y);
             CHECK(cell >= span.first && cell <= span.last);
-            CHECK(sqrt(hs_axis_gap(axis, t, cell, span.centre)) <= fabs(y - t) * (1.0 + 0x1p-50));
+            CHECK(sqrt(hs_axis_gap(axis, t, cell, centre)) <= fabs(y - t) * (1.0 + 0x1p-50));
         }
-        CHECK(span.first <= span.centre && span.centre <= span.last);
+        CHECK(span.first <= centre && centre <= span.last);
     }
 }
 
@@ -81,8 +82,7 @@ ends_in_far_images_are_held(void)
     for (int trial = 0; trial < TRIALS(20000); trial++) {
         const double     length = 0.5 + 8.0 * random_unit(&random);
         const int        n = 2 + (int)(random_bits(&random) % 9);
-        const hs_axes    axes = axes_of(length, length / (n + 0.25), 1.0);
-        const hs_axis   *axis = &axes.axis[0];
+        const hs_axis    of_cells = axis_of(length, length / (n + 0.25), 1.0), *axis = &of_cells;
         const int64_t    cell = 1 + (int64_t)(random_bits(&random) % (uint64_t)(n - 1));
         const int64_t    image = (trial % 2 ? 1 : -1) * (2 + trial / 2 % 300);
         const double     step = ldexp(1.0, ilogb(length) - 53); /* no coordinate has finer ones */
@@ -157,7 +157,7 @@ balls_reach_as_far_as_errors_may(void)
     options.cell_size = 2.0;
     CHECK(hs_dynamic_new(&options, &list, &failure) == HS_OK);
     for (int trial = 0; trial < 400; trial++) {
-        const hs_axis *axis = &list->axes.axis[trial % 2];
+        const hs_axis *axis = &list->axis[trial % 2];
         double         centre[2];
         hs_ball        ball;
         for (int k = 0; k < 2; k++)

@@ -322,7 +322,7 @@ sums_are_exact(void)
         const double a = any_double(&random), b = any_double(&random);
         const bool   same = trial % 8 == 0;
         const double c = same ? -b : any_double(&random), d = same ? a : any_double(&random);
-        hs_dyadic    x, y, one, other, sum, copy;
+        hs_dyadic    x, y, one, other, sum;
         hs_dyadic_set(a, 0, &x);
         hs_dyadic_set(b, 0, &y);
         hs_dyadic_multiply(&x, &y, &one);
@@ -334,10 +334,11 @@ sums_are_exact(void)
         hs_dyadic_add(&one, &other, false, &sum);
         wrong += !is_same(&sum, &added);
         zeros += sum.n == 0;
-        hs_dyadic_copy(&sum, &copy);
-        wrong += !is_same(&copy, &added);
         hs_dyadic_add(&one, &other, true, &sum);
         wrong += !is_same(&sum, &less);
+        sum = one;
+        hs_dyadic_add_to(&sum, &other);
+        wrong += !is_same(&sum, &added);
         big left = first, right = second;
         left.sign = left.sign != 0;
         right.sign = right.sign != 0;

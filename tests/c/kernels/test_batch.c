@@ -225,7 +225,7 @@ batches_do_what_is_done_for_one_pair(void)
     harness_random random = {6021};
     static scene   s;
     int            n_open = 0, n_left = 0, n_pairs = 0;
-    for (int trial = 0; trial < 2400; trial++) {
+    for (int trial = 0; trial < THIRD_OF_TRIALS(2400); trial++) {
         const kind of = (kind)(trial % 7);
         s.ndim = 1 + trial / 7 % (trial % 3 ? 3 : HS_MAX_DIM);
         s.n = (int32_t)(random_bits(&random) % (ROOM - HS_BATCH_PADDING + 1));

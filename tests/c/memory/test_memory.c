@@ -66,7 +66,7 @@ static void
 larger_arenas_are_left_for_later(void)
 {
     const size_t limit = hs_pool_limit();
-    hs_test_use_arena(true);
+    hs_test_uses_arena = true;
     for (int off = 0; off < 2; off++) {
         hs_pool_clear();
         hs_pool_set_limit(off ? 0 : limit);
@@ -99,7 +99,7 @@ larger_arenas_are_left_for_later(void)
         hs_account_close(&account);
     }
     hs_pool_clear();
-    hs_test_use_arena(false);
+    hs_test_uses_arena = false;
 }
 
 /* While another thread has the lock of the pool. */
@@ -146,7 +146,7 @@ give_all(void *last)
 static void
 calls_end_without_any_memory(void)
 {
-    hs_test_use_arena(true);
+    hs_test_uses_arena = true;
     for (int n_left = 0; n_left < 2; n_left++) {
         hs_pool_clear();
         hs_account account = new_account(), next = new_account();
@@ -174,7 +174,7 @@ calls_end_without_any_memory(void)
         hs_account_close(&next);
     }
     hs_pool_clear();
-    hs_test_use_arena(false);
+    hs_test_uses_arena = false;
 }
 
 #endif

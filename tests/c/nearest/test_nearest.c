@@ -90,7 +90,6 @@ open_ranker(int32_t i, hs_nearest_ranker *ranker)
     while (hs_search_asking(&unit.search)->order[si] != i)
         si++;
     *ranker = (hs_nearest_ranker){.near = &unit.near, .options = &unit.call.options};
-    CHECK(hs_nearest_ranker_init(ranker) == HS_OK);
     hs_nearest_ranker_set(ranker, si);
 }
 
@@ -123,7 +122,6 @@ rows_end_at_the_largest_distance(void)
         }
         memset(&writer, 0, sizeof writer);
         hs_nearest_writer_init(&unit.near, &writer);
-        CHECK(hs_nearest_writer_open(&writer) == HS_OK);
         CHECK(hs_nearest_write(&writer, &ranker, count) == HS_OK);
         hs_nearest_flush(&writer);
         const int64_t *j = hs_output_column(&unit.rows, HS_WANT_J);
@@ -132,7 +130,6 @@ rows_end_at_the_largest_distance(void)
             CHECK(j[e] == (e < within[l] ? e + 1 : -1));
             CHECK(d[e] == (e < within[l] ? line[e + 1] : INFINITY));
         }
-        hs_shared_release(unit.near.shared, (void **)&writer.pairs);
         hs_nearest_ranker_free(&ranker);
         nearest_unit_clear(&unit, &leaves, &block);
         nearest_unit_close(&unit);

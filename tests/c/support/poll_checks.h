@@ -70,9 +70,9 @@ static inline void
 check_arena(hs_status (*run)(void *), void *context)
 {
     const int64_t before = hs_test_live_blocks();
-    hs_test_use_arena(true);
+    hs_test_uses_arena = true;
     CHECK(run(context) == HS_OK);
-    hs_test_use_arena(false);
+    hs_test_uses_arena = false;
     CHECK(hs_test_live_blocks() == before);
 }
 

@@ -21,7 +21,7 @@ enum { POINTS = 24 };
  * says of the second. */
 typedef struct two_steps {
     hs_frame  built, now;
-    hs_store  jumps;
+    void     *jumps;
     hs_status status;
     double    radius, cutoff, margin;
     bool      jumped;
@@ -54,11 +54,11 @@ static void
 find_margin(two_steps *s, double radius, double cutoff, const hs_options *options)
 {
     const hs_options plain = hs_options_default();
-    const hs_motion  motion = {&s->built, &s->now, radius, cutoff};
+    const hs_verlet  list = {.frames = {s->built}, .listing = {.radius = radius}, .cutoff = cutoff};
     s->radius = radius;
     s->cutoff = cutoff;
     s->jumped = true; /* is set in any case */
-    s->status = hs_motion_margin(&motion, options != NULL ? options : &plain, &s->margin,
+    s->status = hs_motion_margin(&list, &s->now, options != NULL ? options : &plain, &s->margin,
                                  &s->jumped, &s->jumps);
 }
 
@@ -67,7 +67,7 @@ free_steps(two_steps *s)
 {
     hs_frame_free(&s->built);
     hs_frame_free(&s->now);
-    hs_store_free(&s->jumps);
+    hs_free(NULL, s->jumps);
 }
 
 /* The margin between two scenes, frames and all. */
@@ -100,7 +100,7 @@ keeps_promise(const two_steps *s, brute_scene before, brute_scene behind)
     }
     for (int64_t e = 0; e < now.n; e++) {
         brute_pair     pair = now.pairs[e];
-        const int64_t *jumps = s->jumps.data;
+        const int64_t *jumps = s->jumps;
         for (int r = 0; s->jumped && r < m; r++) {
             pair.shift[row[r]] += jumps[(int64_t)pair.j * m + r] - jumps[(int64_t)pair.i * m + r];
         }
@@ -290,7 +290,7 @@ it_stops_when_told_to_or_without_memory(void)
     CHECK(s.status == HS_ERR_INTERRUPTED && s.margin == -INFINITY && !s.jumped && polls == 1);
     options.poll = NULL;
     find_margin(&s, 0.5, 0.25, &options);
-    const int64_t *jumps = s.jumps.data;
+    const int64_t *jumps = s.jumps;
     CHECK(s.status == HS_OK && s.margin > 0.2499 && s.jumped && jumps[5] == 3 && jumps[6] == 0);
     free_steps(&s);
 }
@@ -307,7 +307,7 @@ it_stops_when_told_to_or_without_memory(void)
 enum { N_MOTION_MARGIN = 6 };
 
 static hs_frame frame_before, frame_now;
-static hs_store motion_jumps;
+static void    *motion_jumps;
 
 static void
 take(const double *x, int64_t n, int d, const hs_box *box, hs_frame *frame)
@@ -322,9 +322,10 @@ static double
 margin_of(double radius, double cutoff, bool *jumped)
 {
     const hs_options options = hs_options_default();
-    const hs_motion  motion = {&frame_before, &frame_now, radius, cutoff};
-    double           margin = NAN;
-    CHECK(hs_motion_margin(&motion, &options, &margin, jumped, &motion_jumps) == HS_OK);
+    const hs_verlet  list = {
+         .frames = {frame_before}, .listing = {.radius = radius}, .cutoff = cutoff};
+    double margin = NAN;
+    CHECK(hs_motion_margin(&list, &frame_now, &options, &margin, jumped, &motion_jumps) == HS_OK);
     return margin;
 }
 
@@ -333,7 +334,7 @@ free_all(void)
 {
     hs_frame_free(&frame_before);
     hs_frame_free(&frame_now);
-    hs_store_free(&motion_jumps);
+    hs_free(NULL, motion_jumps);
 }
 
 /* What is gone of a skin though nothing has moved but by what all share, between `least`, which the
@@ -358,7 +359,7 @@ a_jump_of_one_costs_a_difference_and_its_wrapping(void)
     take(x, N_MOTION_MARGIN, 2, &box, &frame_before);
     take(y, N_MOTION_MARGIN, 2, &box, &frame_now);
     const double used = radius - cutoff - margin_of(radius, cutoff, &jumped);
-    CHECK(jumped && ((const int64_t *)motion_jumps.data)[4] == INT64_C(1) << 20);
+    CHECK(jumped && ((const int64_t *)motion_jumps)[4] == INT64_C(1) << 20);
     check_used(used, 2.0 * sqrt(2.0) * UNIT * (0x1p20 + 0x1p21));
     free_all();
 }

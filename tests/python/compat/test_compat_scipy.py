@@ -336,3 +336,17 @@ def test_what_is_just_below_half_a_period_is_closer_than_that():
     d, j = tree.query([[0.0, 0.0]], 2, distance_upper_bound=5.0)
     assert j.tolist() == [[0, 1]]
     assert d[0, 1] <= 5.0
+
+
+@pytest.mark.parametrize("ndim", [1, 3, 8, 9, 400])
+def test_more_neighbours_than_are_within_half_a_period_are_those_of_scipy(rng, ndim):
+    theirs, tree = both("KDTree", rng.random((12, ndim)), boxsize=1.0)
+    for k in (1, 2, 6, 12, 14):
+        alike(tree.query(theirs.data, k), theirs.query(theirs.data, k))
+
+
+@pytest.mark.parametrize("boxsize", [None, 1.0])
+def test_numbers_of_neighbours_beyond_any_memory_are_refused(rng, boxsize):
+    for tree in both("KDTree", rng.random((12, 3)), boxsize=boxsize):
+        with pytest.raises(ValueError):
+            tree.query(tree.data, 10**400)

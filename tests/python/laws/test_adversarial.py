@@ -5,7 +5,7 @@ Two small clusters of points, a few ulp wide, are placed so that every point of 
 the cutoff from every point of the other, give or take a few ulp: across faces, far from home,
 in every dimension and at every magnitude. No rounded comparison survives this.
 
-HALFSHELL_ADVERSARIAL sets the number of decisions (default 500 000).
+HALFSHELL_ADVERSARIAL sets the number of decisions (default 250 000).
 """
 
 import math
@@ -22,7 +22,7 @@ from calls import call
 from halfshell._check.reference import exact_square
 from oracles import as_integers
 
-DECISIONS = int(float(os.environ.get("HALFSHELL_ADVERSARIAL", "500000")))
+DECISIONS = int(float(os.environ.get("HALFSHELL_ADVERSARIAL", "250000")))
 
 # kind: its share of the decisions
 KINDS = {

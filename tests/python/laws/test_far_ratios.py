@@ -12,6 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 import definition
 import halfshell as hs
@@ -19,6 +20,8 @@ import halfshell as hs
 TOO_FAR = "lies too many box vectors away"
 SMALLEST = -1074
 LARGEST = 1023
+#: Times as many scenes as usually, with HALFSHELL_EXAMPLES.
+MANY = -(-settings().max_examples // 50)
 
 
 # ---- scenes --------------------------------------------------------------------------------
@@ -163,9 +166,9 @@ def scene_of(family, seed):
 @pytest.mark.parametrize(
     ("family", "seeds"),
     [
-        *(("any ratio", range(k, k + 40)) for k in range(0, 160, 40)),
-        *((family, range(k, k + 20)) for k in (0, 20, 40) for family in ("float32", "skewed")),
-        ("subnormal", range(40)),
+        *(("any ratio", range(k, k + 20)) for k in range(0, 80 * MANY, 20)),
+        *((f, range(k, k + 15)) for k in range(0, 30 * MANY, 15) for f in ("float32", "skewed")),
+        *(("subnormal", range(k, k + 20)) for k in range(0, 20 * MANY, 20)),
     ],
     ids=str,
 )
