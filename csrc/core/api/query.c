@@ -81,7 +81,7 @@ check_shells(const hs_options *options, hs_failure *failure)
         return HS_ERR_EDGES;
     }
     for (int64_t k = 0; k < n; k++) {
-        if (!isfinite(at[k]) || at[k] < 0.0 || (k > 0 && at[k] < at[k - 1])) {
+        if (!hs_is_length(at[k]) || (k > 0 && at[k] < at[k - 1])) {
             failure->row = k;
             failure->value = at[k];
             return HS_ERR_EDGES;
@@ -140,7 +140,7 @@ check_reach(const hs_query *query, hs_failure *failure)
         (!sets->is_full && hs_rule_is_directed(reach->rule) && reach->n_types == 0)) {
         return HS_ERR_ARGUMENT;
     }
-    if (reach->has_supports && !(reach->extent >= 0.0 && isfinite(reach->extent))) {
+    if (reach->has_supports && !hs_is_length(reach->extent)) {
         failure->value = reach->extent;
         return HS_ERR_EXTENT;
     }

@@ -36,6 +36,7 @@ hs_status hs_check_resources(const hs_options *options);
 /* `known`: the HS_WANT_ bits that there may be. */
 hs_status hs_check_options(const hs_options *options, unsigned known);
 
+/* Of a cutoff, a radius, an edge: finite and not negative. */
 HS_ALWAYS_INLINE bool
 hs_is_length(double x)
 {

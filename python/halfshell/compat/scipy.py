@@ -8,9 +8,9 @@ floats, while SciPy compares rounded squares. So the answers differ if rounding 
 
 With `boxsize` the nearest image of a point counts, as there. SciPy itself answers what is not
 decided here: `p` other than 2, `eps` above 0, more than 8 dimensions, radii that are negative or
-infinite, and, with `boxsize`, all of a call one of whose radii is half a period or more, or which
-asks for about as many of the nearest as lie within half a period, and otherwise those points that
-lack some within half a period.
+infinite, and, with `boxsize`, all of a call one of whose radii is half a period or more, or whose
+`k` is about the number of points within half a period, and otherwise those points that lack some
+within half a period.
 
 Lists of neighbours ascend, also where SciPy's have no order; among neighbours at the same distance
 `query` has the lowest numbers. `workers` is the number of threads; methods without it use as many
@@ -96,7 +96,7 @@ class _Searches:
         most = 0 if ranks is None else ranks if isinstance(ranks, int) else int(ranks.max())
         bound = float(distance_upper_bound) if _is_number(distance_upper_bound) else -1.0
         is_ours = threads is not None and most > 0 and bound >= 0.0 and self.n > 0
-        # Where many queries would have to be asked again of SciPy, it is asked at once.
+        # SciPy takes the whole call where it would have to answer many of its queries.
         if is_ours and bound > self._half:
             of_all = min(most, self.n)
             is_ours = of_all + math.sqrt(of_all - 1) <= self._expected
